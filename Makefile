@@ -1,0 +1,47 @@
+# Every target creates .venv where it is missing and installs what it needs; a stamp file per
+# set of extras makes the second call free until pyproject.toml or constraints.txt change.
+#   PYTHON=python3.12   the interpreter that creates .venv
+#   ARGS="..."          extra arguments for the command that the target runs
+
+PYTHON ?= python3
+ARGS ?=
+BIN := .venv/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help train test lint bench clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+train: .venv/.installed-train ## train PBDRope-v0: model, learning curve and video
+	$(BIN)/python train/train.py --env pbd_gym:PBDRope-v0 --video $(ARGS)
+
+test: .venv/.installed-test ## run the tests
+	$(BIN)/python -m pytest $(ARGS)
+
+lint: .venv/.installed-all ## check style, formatting, types, imports and spelling
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+	$(BIN)/codespell
+
+bench: .venv/.installed-core ## measure control steps per second
+	$(BIN)/python benchmarks/throughput.py $(ARGS)
+
+clean: ## remove .venv, caches and build files; results of training stay
+	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.venv/.installed-core: EXTRAS :=
+.venv/.installed-train: EXTRAS := [train,video]
+.venv/.installed-test: EXTRAS := [train,video,test]
+.venv/.installed-all: EXTRAS := [all]
+
+.venv/.installed-%: pyproject.toml constraints.txt | $(BIN)/pip
+	$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt -e ".$(EXTRAS)"
+	@touch $@
+
+# pip is the last thing that venv writes, so a half-made .venv is not taken for a whole one.
+$(BIN)/pip:
+	$(PYTHON) -m venv .venv
