@@ -1,0 +1,131 @@
+"""Hyperparameters of stable-baselines3 per algorithm and environment, in the format of rl_zoo3.
+
+One YAML file per algorithm maps environment ids to settings; `default` serves every other id.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from pathlib import Path
+from typing import Any
+
+ALGORITHMS = ("ppo", "sac")
+
+# Entries that set up the training; all others are arguments of the algorithm.
+SETUP = frozenset({"n_timesteps", "n_envs", "env_kwargs"})
+
+# Arguments of the algorithms that a settings file cannot give: the training sets them itself, or
+# they take objects. State-dependent exploration (sde) is refused as its noise is in no checkpoint.
+_REFUSED = frozenset(
+    {
+        "_init_setup_model",
+        "action_noise",
+        "device",
+        "env",
+        "replay_buffer_class",
+        "rollout_buffer_class",
+        "sde_sample_freq",
+        "seed",
+        "self",
+        "stats_window_size",
+        "tensorboard_log",
+        "use_sde",
+        "use_sde_at_warmup",
+        "verbose",
+    }
+)
+
+
+def load_hyperparameters(algo: str, env_id: str) -> dict[str, Any]:
+    """Read the settings of one environment, as they stand in the file.
+
+    Args:
+        algo: "ppo" or "sac".
+        env_id: Environment id, with or without its module: "pbd_gym:PBDRope-v0".
+
+    Returns:
+        The settings under `env_id`, or those under `default` when it has none of its own.
+    """
+    import yaml
+
+    check_algorithm(algo)
+    entries = yaml.safe_load((Path(__file__).parent / f"{algo}.yml").read_text(encoding="utf-8"))
+    hyperparameters = dict(entries.get(env_id.split(":")[-1], entries["default"]))
+    check_hyperparameters(algo, hyperparameters)
+    return hyperparameters
+
+
+def algorithm_class(algo: str) -> type[Any]:
+    """Return stable-baselines3's class for an algorithm's name."""
+    check_algorithm(algo)
+    from stable_baselines3 import PPO, SAC
+
+    return {"ppo": PPO, "sac": SAC}[algo]
+
+
+def algorithm_arguments(algo: str, hyperparameters: dict[str, Any]) -> dict[str, Any]:
+    """Turn settings into keyword arguments of `algorithm_class(algo)`.
+
+    Drops what sets up the training, makes schedules of strings such as "lin_0.001", and reads
+    `policy_kwargs` given as text, "dict(net_arch=[64], activation_fn=nn.ReLU)".
+    """
+    from stable_baselines3.common.utils import LinearSchedule
+
+    check_hyperparameters(algo, hyperparameters)
+    arguments = {key: value for key, value in hyperparameters.items() if key not in SETUP}
+    for key in ("learning_rate", "clip_range", "clip_range_vf"):
+        if isinstance(arguments.get(key), str):
+            arguments[key] = LinearSchedule(_linear_start(key, arguments[key]), 0.0, 1.0)
+    if isinstance(arguments.get("policy_kwargs"), str):
+        arguments["policy_kwargs"] = _read_policy_kwargs(arguments["policy_kwargs"])
+    return arguments
+
+
+def check_algorithm(algo: str) -> None:
+    """Raise ValueError unless `algo` is one of `ALGORITHMS`."""
+    if algo not in ALGORITHMS:
+        raise ValueError(f"algo must be one of {', '.join(ALGORITHMS)}, got {algo!r}")
+
+
+def check_hyperparameters(algo: str, hyperparameters: dict[str, Any]) -> None:
+    """Raise ValueError when a name is neither an argument of the algorithm nor in `SETUP`."""
+    arguments = inspect.signature(algorithm_class(algo).__init__).parameters
+    known = (set(arguments) - _REFUSED) | SETUP
+    unknown = sorted(set(hyperparameters) - known)
+    if unknown:
+        raise ValueError(
+            f"unknown hyperparameter of {algo}: {', '.join(unknown)}; "
+            f"known are {', '.join(sorted(known))}"
+        )
+
+
+def _linear_start(name: str, text: str) -> float:
+    kind, _, start = text.partition("_")
+    try:
+        value = float(start)
+    except ValueError:
+        value = -1.0
+    if kind != "lin" or value <= 0.0:
+        raise ValueError(f"{name} must be a number or such as 'lin_0.001', got {text!r}")
+    return value
+
+
+def _read_policy_kwargs(text: str) -> dict[str, Any]:
+    """Read "dict(key=value, ...)" of literals and torch.nn names without evaluating code."""
+    from torch import nn
+
+    def read(node: ast.expr) -> Any:
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "nn":
+            return getattr(nn, node.attr)
+        return ast.literal_eval(node)
+
+    try:
+        call = ast.parse(text.strip(), mode="eval").body
+        if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "dict" and not call.args):
+            raise ValueError("not a call of dict with keywords")
+        return {str(keyword.arg): read(keyword.value) for keyword in call.keywords}
+    except (SyntaxError, ValueError, AttributeError) as error:
+        raise ValueError(
+            f"policy_kwargs must be a mapping or 'dict(key=literal or nn.Name, ...)', got {text!r}"
+        ) from error
