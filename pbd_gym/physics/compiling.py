@@ -1,0 +1,121 @@
+"""Compiles the kernels, once per (axes, lanes), into a disk cache that cannot go stale.
+
+The kernels package is loaded under one name per pair of compile-time constants, as a C++ template
+is instantiated: `kernels` with DIM = 2 and LANES = 1 is the module `kernels_2d_1`. numba would not
+notice that a called function in another file changed, so the cache folder is named by a hash of
+all kernel sources, of numba's version and of the processor compiled for.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+
+_KERNELS = Path(__file__).parent / "kernels"
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function to IEEE arithmetic that runs without the interpreter lock.
+
+    No fastmath: the bits must not depend on the processor. error_model="numpy", as the branch that
+    raises ZeroDivisionError would stop the vectoriser.
+    """
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    folder = cache_folder()
+    if folder is None:
+        return numba.njit(**options)(function)
+    # numba names its files after the source file alone: each loaded package needs a folder of its own
+    folder /= function.__module__.split(".")[-2]
+    before = numba.config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
+    numba.config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]
+    try:
+        return numba.njit(cache=True, **options)(function)
+    finally:
+        numba.config.CACHE_DIR = before  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@functools.cache
+def load_kernels(dim: int, lanes: int) -> ModuleType:
+    """Return the kernels' step module for `dim` axes and `lanes` worlds side by side."""
+    name = f"{__package__}.kernels_{dim}d_{lanes}"
+    spec = importlib.util.spec_from_file_location(
+        name, _KERNELS / "__init__.py", submodule_search_locations=[str(_KERNELS)]
+    )
+    if spec is None or spec.loader is None:
+        raise ImportError(f"the kernels are missing at {_KERNELS}")
+    package = importlib.util.module_from_spec(spec)
+    sys.modules[name] = package
+    spec.loader.exec_module(package)
+    package.DIM, package.LANES = dim, lanes  # pyright: ignore[reportAttributeAccessIssue]
+    return importlib.import_module(f"{name}.step")
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Return the folder of compiled kernels: the first that can be written; None if none can.
+
+    NUMBA_CACHE_DIR is taken before the user's cache folder, then the system's temporary folder.
+    """
+    digest = hashlib.sha256()
+    for source in (*sorted(_KERNELS.glob("*.py")), Path(__file__).with_name("parameters.py")):
+        digest.update(source.read_bytes())
+    target = (
+        numba.__version__,
+        sys.version,
+        os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name(),
+        os.environ.get("NUMBA_CPU_FEATURES"),
+        # NUMBA_DISABLE_JIT and other switches change what is compiled
+        os.environ.get("NUMBA_BOUNDSCHECK"),
+    )
+    digest.update(repr(target).encode())
+    name = f"kernels-{digest.hexdigest()[:16]}"
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    candidates = [
+        os.environ.get("NUMBA_CACHE_DIR"),
+        os.path.join(home, "pbd_gym"),
+        os.path.join(tempfile.gettempdir(), f"pbd_gym-{user}"),
+    ]
+    for candidate in filter(None, candidates):
+        folder = Path(candidate) / name
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return None
+
+
+def announce_compilation(variant: str) -> Callable[[], None]:
+    """Say in one line on stderr that kernels are about to be compiled, if they are.
+
+    Args:
+        variant: What tells this compilation from others, in words.
+
+    Returns:
+        A function to call when the kernels have run: it notes that they are on disk now.
+    """
+    folder = cache_folder()
+    mark = None if folder is None else folder / f"{variant.replace(', ', '-')}.compiled"
+    if mark is not None and mark.exists():
+        return lambda: None
+    where = "not kept: no cache folder can be written" if folder is None else f"kept in {folder}"
+    print(
+        f"pbd_gym: compiling kernels ({variant}), about 10 seconds, once; {where}",
+        file=sys.stderr,
+        flush=True,
+    )
+    return lambda: mark.touch() if mark is not None and mark.parent.exists() else None

@@ -1,0 +1,232 @@
+"""Chains of links solved directly: a tridiagonal system in the links' multipliers, O(links).
+
+Link i holds particle i to particle i + 1 with C_i = |x_i - x_(i+1)| - rest_i. Its gradients are
++n_i and -n_i, neighbouring links share one particle, so the system of Newton's method is
+
+    (w_i + w_(i+1) + alpha_i/h^2) s_i - w_i (n_i.n_(i-1)) s_(i-1) - w_(i+1) (n_i.n_(i+1)) s_(i+1) = C_i
+
+and the particles move by x_i -= w_i n_i s_i, x_(i+1) += w_(i+1) n_i s_i (Mueller et al. 2007, eq. 8-11, but for
+all links of the chain at once instead of one after another).
+"""
+
+import numpy as np
+
+from ..compiling import kernel
+from .layout import (
+    COUPLING,
+    DIM,
+    DIRECTION,
+    LANES,
+    MULTIPLIER,
+    PIVOT,
+    POSITION,
+    START,
+    VELOCITY,
+)
+
+# A pivot below this share of the diagonal means that the links fight over a taut line between two
+# pins; the floor keeps their multipliers finite.
+_PIVOT_FLOOR = 1e-5
+# Stands for an infinite compliance: the link takes no part.
+_FREE = 1e30
+
+
+@kernel
+def project_chains(work, model, inverse_h2, iteration):
+    """Bring the links of every chain to their lengths, along their current directions."""
+    zero_row = work[work.shape[0] - 1]
+    for chain in range(model.chain_offsets.shape[0] - 1):
+        first, last = model.chain_offsets[chain], model.chain_offsets[chain + 1] - 1
+        before = zero_row
+        for entry in range(first, last):
+            row = work[model.chain_particles[entry]]
+            _eliminate_current(
+                before,
+                row,
+                work[model.chain_particles[entry + 1]],
+                model.inverse_mass[model.chain_particles[entry]],
+                model.inverse_mass[model.chain_particles[entry + 1]],
+                model.link_rest[entry],
+                _stiffened(model.link_compliance, entry, inverse_h2, iteration),
+                _stiffened(model.link_compression_compliance, entry, inverse_h2, iteration),
+            )
+            before = row
+        _back_substitute(work, model, first, last, POSITION)
+
+
+@kernel
+def project_chains_from_start(work, model, inverse_h2, iteration):
+    """Bring the links to their lengths along their directions at the start of the substep (SHAKE)."""
+    zero_row = work[work.shape[0] - 1]
+    for chain in range(model.chain_offsets.shape[0] - 1):
+        first, last = model.chain_offsets[chain], model.chain_offsets[chain + 1] - 1
+        before, mass_before, rest_before = zero_row, model.link_rest[first] * 0, model.link_rest[first]
+        for entry in range(first, last):
+            row = work[model.chain_particles[entry]]
+            _eliminate_start(
+                before,
+                row,
+                work[model.chain_particles[entry + 1]],
+                model.inverse_mass[model.chain_particles[entry]],
+                model.inverse_mass[model.chain_particles[entry + 1]],
+                rest_before,
+                model.link_rest[entry],
+                _stiffened(model.link_compliance, entry, inverse_h2, iteration),
+            )
+            before, rest_before = row, model.link_rest[entry]
+        _back_substitute(work, model, first, last, POSITION)
+
+
+@kernel
+def project_chain_velocities(work, model):
+    """Remove the velocity along rigid links (the second half of RATTLE)."""
+    zero_row = work[work.shape[0] - 1]
+    free = work.dtype.type(_FREE)
+    zero = work.dtype.type(0)
+    for chain in range(model.chain_offsets.shape[0] - 1):
+        first, last = model.chain_offsets[chain], model.chain_offsets[chain + 1] - 1
+        before = zero_row
+        for entry in range(first, last):
+            row = work[model.chain_particles[entry]]
+            _eliminate_velocity(
+                before,
+                row,
+                work[model.chain_particles[entry + 1]],
+                model.inverse_mass[model.chain_particles[entry]],
+                model.inverse_mass[model.chain_particles[entry + 1]],
+                zero if model.link_compliance[entry] == zero else free,
+            )
+            before = row
+        _back_substitute(work, model, first, last, VELOCITY)
+
+
+@kernel
+def _stiffened(compliance, entry, inverse_h2, iteration):
+    """Return compliance/h^2; after the first iteration a compliant link keeps its force."""
+    if iteration == 0:
+        return compliance[entry] * inverse_h2
+    if compliance[entry] == 0:
+        return compliance[entry]
+    return compliance.dtype.type(_FREE)
+
+
+@kernel
+def _eliminate_current(before, a, b, mass_a, mass_b, rest, stretch, compression):
+    """Eliminate the link before this one; the direction is the current one."""
+    one, zero = a.dtype.type(1), a.dtype.type(0)
+    floor = a.dtype.type(_PIVOT_FLOOR)
+    for lane in range(LANES):
+        square = zero
+        for k in range(DIM):
+            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            square += delta * delta
+        length = np.sqrt(square)
+        inverse = one / length if length > zero else zero
+        error = length - rest
+        cosine = zero
+        for k in range(DIM):
+            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            cosine += delta * inverse * before[DIRECTION + k * LANES + lane]
+            a[DIRECTION + k * LANES + lane] = delta * inverse
+        alpha = stretch if error >= zero else compression
+        coupling = -mass_a * cosine
+        factor = coupling * before[PIVOT + lane]
+        diagonal = mass_a + mass_b + alpha
+        pivot = max(diagonal - factor * coupling, floor * diagonal)
+        a[COUPLING + lane] = coupling
+        a[PIVOT + lane] = one / pivot if pivot > zero else zero
+        a[MULTIPLIER + lane] = error - factor * before[MULTIPLIER + lane]
+
+
+@kernel
+def _eliminate_start(before, a, b, mass_a, mass_b, rest_before, rest, alpha):
+    """Eliminate the link before this one; the direction is that of the start of the substep.
+
+    C = (|x_a - x_b|^2 - rest^2) / (2 rest) has the gradient (x_a - x_b)/rest: no square root, and
+    with corrections along the start direction the system is no longer symmetric. Where a link has
+    turned by 60 degrees or more within the substep, its current direction is taken.
+    """
+    one, zero, half = a.dtype.type(1), a.dtype.type(0), a.dtype.type(0.5)
+    floor = a.dtype.type(_PIVOT_FLOOR)
+    inverse, inverse_before = one / rest, one / rest_before
+    for lane in range(LANES):
+        square, aligned = zero, zero
+        for k in range(DIM):
+            now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
+            square += now * now
+            aligned += now * start
+        turned = aligned < half * rest * rest
+        own, lower, upper = zero, zero, zero
+        for k in range(DIM):
+            now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
+            link_before = before[POSITION + k * LANES + lane] - a[POSITION + k * LANES + lane]
+            direction = (now if turned else start) * inverse
+            own += now * inverse * direction
+            lower += now * inverse * before[DIRECTION + k * LANES + lane]
+            upper += link_before * inverse_before * direction
+            a[DIRECTION + k * LANES + lane] = direction
+        diagonal = (mass_a + mass_b) * own + alpha
+        factor = -mass_a * lower * before[PIVOT + lane]
+        coupling = -mass_a * upper
+        pivot = max(diagonal - factor * coupling, floor * diagonal)
+        error = half * (square * inverse - rest)
+        a[COUPLING + lane] = coupling
+        a[PIVOT + lane] = one / pivot if pivot > zero else zero
+        a[MULTIPLIER + lane] = error - factor * before[MULTIPLIER + lane]
+
+
+@kernel
+def _eliminate_velocity(before, a, b, mass_a, mass_b, alpha):
+    """Eliminate the link before this one; the unknowns are impulses along the links."""
+    one, zero = a.dtype.type(1), a.dtype.type(0)
+    floor = a.dtype.type(_PIVOT_FLOOR)
+    for lane in range(LANES):
+        square, rate = zero, zero
+        for k in range(DIM):
+            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            square += delta * delta
+            rate += delta * (a[VELOCITY + k * LANES + lane] - b[VELOCITY + k * LANES + lane])
+        length = np.sqrt(square)
+        inverse = one / length if length > zero else zero
+        cosine = zero
+        for k in range(DIM):
+            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            cosine += delta * inverse * before[DIRECTION + k * LANES + lane]
+            a[DIRECTION + k * LANES + lane] = delta * inverse
+        coupling = -mass_a * cosine
+        factor = coupling * before[PIVOT + lane]
+        diagonal = mass_a + mass_b + alpha
+        pivot = max(diagonal - factor * coupling, floor * diagonal)
+        a[COUPLING + lane] = coupling
+        a[PIVOT + lane] = one / pivot if pivot > zero else zero
+        a[MULTIPLIER + lane] = rate * inverse - factor * before[MULTIPLIER + lane]
+
+
+@kernel
+def _back_substitute(work, model, first, last, quantity):
+    """Find the multipliers from the last link to the first and move the particles by them."""
+    after = work[work.shape[0] - 1]
+    for entry in range(last - 1, first - 1, -1):
+        row = work[model.chain_particles[entry]]
+        _apply(
+            row,
+            work[model.chain_particles[entry + 1]],
+            after,
+            model.inverse_mass[model.chain_particles[entry]],
+            model.inverse_mass[model.chain_particles[entry + 1]],
+            quantity,
+        )
+        after = row
+
+
+@kernel
+def _apply(a, b, after, mass_a, mass_b, quantity):
+    for lane in range(LANES):
+        step = (a[MULTIPLIER + lane] - after[COUPLING + lane] * after[MULTIPLIER + lane]) * a[PIVOT + lane]
+        a[MULTIPLIER + lane] = step
+        for k in range(DIM):
+            move = step * a[DIRECTION + k * LANES + lane]
+            a[quantity + k * LANES + lane] -= mass_a * move
+            b[quantity + k * LANES + lane] += mass_b * move

@@ -1,0 +1,179 @@
+"""Self-collision: particles of one body keep their distance.
+
+Every world has contacts of its own, so this part runs world by world. Pairs that may meet are
+found once per control step with a hashed grid (linear in particles), contacts are solved in every
+substep, in the order in which they were found.
+"""
+
+import numpy as np
+
+from ..compiling import kernel
+from .layout import DIM, LANES, POSITION, START, VELOCITY
+
+# Pairs are sought within this many collision distances at most: faster particles would meet
+# undetected, but a cloth would rather fill the list with pairs that never touch.
+_FARTHEST = 3.0
+# Cells beyond this index mean that the world has diverged: it has no contacts any more.
+_LAST_CELL = 1e6
+
+
+@kernel
+def find_pairs(work, model, grid, pairs, counts, dt):
+    """List, for every lane, the pairs that can come into contact within the control step.
+
+    grid: (4 + DIM, size) integers of scratch; pairs: (LANES, capacity, 2); counts: (LANES,). What exceeds
+    the capacity is left out (the capacity is several times what a crumpled cloth needs).
+    """
+    for lane in range(LANES):
+        counts[lane] = 0
+        reach = _reach(work, model, lane, dt)
+        if _sort_into_cells(work, model, lane, reach, grid):
+            counts[lane] = _list_pairs(work, model, lane, reach, grid, pairs[lane])
+
+
+@kernel
+def _reach(work, model, lane, dt):
+    """Return the distance within which two particles can meet in dt [m]."""
+    fastest = work.dtype.type(0)
+    for index in range(model.collision_particles.shape[0]):
+        row = work[model.collision_particles[index]]
+        square = work.dtype.type(0)
+        for k in range(DIM):
+            square += row[VELOCITY + k * LANES + lane] * row[VELOCITY + k * LANES + lane]
+        fastest = max(fastest, square)
+    distance = model.collision_distance[0]
+    travel = work.dtype.type(2) * np.sqrt(fastest) * dt
+    return distance + min(travel, work.dtype.type(_FARTHEST - 1.0) * distance)
+
+
+@kernel
+def _sort_into_cells(work, model, lane, reach, grid):
+    """Counting sort of the particles by hashed cell; False where a position is out of all bounds.
+
+    Rows of grid: 0 first entry of a bucket, 1 sorted particles, 2 bucket of a particle, 3 fill
+    marks, 4... cell coordinates of a particle.
+    """
+    count = model.collision_particles.shape[0]
+    buckets = grid.shape[1] - 1
+    limit = work.dtype.type(_LAST_CELL)
+    for bucket in range(buckets + 1):
+        grid[0, bucket] = 0
+    for index in range(count):
+        row = work[model.collision_particles[index]]
+        for k in range(DIM):
+            cell = np.floor(row[POSITION + k * LANES + lane] / reach)
+            if not abs(cell) < limit:
+                return False
+            grid[4 + k, index] = np.int64(cell)
+        bucket = _bucket(grid, index, 0, buckets)
+        grid[2, index] = bucket
+        grid[0, bucket + 1] += 1
+    for bucket in range(buckets):
+        grid[0, bucket + 1] += grid[0, bucket]
+        grid[3, bucket] = grid[0, bucket]
+    for index in range(count):
+        bucket = grid[2, index]
+        grid[1, grid[3, bucket]] = index
+        grid[3, bucket] += 1
+    return True
+
+
+@kernel
+def _bucket(grid, index, neighbour, buckets):
+    """Return the bucket of a neighbour (0 is the own cell) of a particle's cell."""
+    key = np.int64(0)
+    for k in range(DIM):
+        key = (key * 73856093) ^ ((grid[4 + k, index] + _offset(neighbour, k)) * 19349663)
+    return (key ^ (key >> 17)) & (buckets - 1)
+
+
+@kernel
+def _offset(neighbour, k):
+    """Return -1, 0 or 1: neighbour counts through all 3^DIM cells around, starting at the own."""
+    for _ in range(k):
+        neighbour //= 3
+    return (neighbour + 1) % 3 - 1
+
+
+@kernel
+def _list_pairs(work, model, lane, reach, grid, pairs):
+    found = 0
+    for index in range(model.collision_particles.shape[0]):
+        particle = model.collision_particles[index]
+        for neighbour in range(3**DIM):
+            bucket = _bucket(grid, index, neighbour, grid.shape[1] - 1)
+            for entry in range(grid[0, bucket], grid[0, bucket + 1]):
+                other = grid[1, entry]
+                if other > index and _in_cell(grid, index, other, neighbour):
+                    other_particle = model.collision_particles[other]
+                    square = _square_distance(work[particle], work[other_particle], lane)
+                    if square < reach * reach and found < pairs.shape[0]:
+                        pairs[found, 0] = particle
+                        pairs[found, 1] = other_particle
+                        found += 1
+    return found
+
+
+@kernel
+def _in_cell(grid, index, other, neighbour):
+    """Tell whether the other particle is in this very neighbour cell, not one of equal hash."""
+    same = True
+    for k in range(DIM):
+        same &= grid[4 + k, other] == grid[4 + k, index] + _offset(neighbour, k)
+    return same
+
+
+@kernel
+def _square_distance(a, b, lane):
+    square = a.dtype.type(0)
+    for k in range(DIM):
+        delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+        square += delta * delta
+    return square
+
+
+@kernel
+def collide_with_self(work, model, pairs, counts):
+    """Push the listed pairs apart to the collision distance, with friction between them."""
+    zero, one = work.dtype.type(0), work.dtype.type(1)
+    distance = model.collision_distance[0]
+    friction = model.contact[2]
+    for lane in range(LANES):
+        for index in range(counts[lane]):
+            i, j = pairs[lane, index, 0], pairs[lane, index, 1]
+            a, b = work[i], work[j]
+            square = _square_distance(a, b, lane)
+            total = model.inverse_mass[i] + model.inverse_mass[j]
+            if zero < square < distance * distance and total > zero:
+                length = np.sqrt(square)
+                depth = distance - length
+                push = depth / (length * total)
+                for k in range(DIM):
+                    move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
+                    a[POSITION + k * LANES + lane] += model.inverse_mass[i] * move
+                    b[POSITION + k * LANES + lane] -= model.inverse_mass[j] * move
+                _rub(a, b, lane, model.inverse_mass[i], model.inverse_mass[j], friction * depth, one)
+
+
+@kernel
+def _rub(a, b, lane, mass_a, mass_b, held, one):
+    """Coulomb friction of a touching pair: hold back its tangential slide of this substep."""
+    zero = a.dtype.type(0)
+    normal_slide, square, gap = zero, zero, zero
+    for k in range(DIM):
+        at = k * LANES + lane
+        normal = a[POSITION + at] - b[POSITION + at]
+        slide = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
+        normal_slide += slide * normal
+        square += slide * slide
+        gap += normal * normal
+    along = normal_slide / gap if gap > zero else zero
+    tangential = np.sqrt(max(square - along * normal_slide, zero))
+    share = min(held / tangential, one) / (mass_a + mass_b) if tangential > zero else zero
+    for k in range(DIM):
+        at = k * LANES + lane
+        normal = a[POSITION + at] - b[POSITION + at]
+        slide = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
+        move = share * (slide - along * normal)
+        a[POSITION + at] -= mass_a * move
+        b[POSITION + at] += mass_b * move

@@ -1,0 +1,160 @@
+"""The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
+
+import numpy as np
+
+from ..compiling import kernel
+from .chain import project_chain_velocities, project_chains, project_chains_from_start
+from .collision import collide_with_self, find_pairs
+from .contact import collide_with_walls, read_velocities
+from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
+from .sweep import (
+    project_bends,
+    project_distance_velocities,
+    project_distances,
+    project_distances_from_start,
+)
+
+__all__ = ["DIM", "LANES", "WIDTH", "advance"]
+
+
+@kernel
+def advance(x, v, targets, tiles, work, collision, second_order, model, timing, substeps):
+    """Advance the worlds of tiles[0] <= tile < tiles[1] by one control step, in place.
+
+    Args:
+        x: Positions (W, N, DIM) [m].
+        v: Velocities (W, N, DIM) [m/s].
+        targets: Where the pins are at the end of the step, (W, P, DIM) [m].
+        tiles: First and last + 1 tile of LANES worlds.
+        work: Scratch (N + 1, WIDTH); the last row is zero.
+        collision: Scratch of self-collision (grid, candidate pairs, their counts), or None. What is
+            None is known when compiling: the code behind it is not compiled at all.
+        second_order: True for RATTLE, None for PBD.
+        model: The Parameters.
+        timing: dt of the control step [s], h of a substep [s], 1/h, 1/h^2, exp(-damping h), and the
+            speed below which impacts do not bounce [m/s].
+        substeps: Number of substeps.
+    """
+    for tile in range(tiles[0], tiles[1]):
+        _load(x, v, tile, work)
+        _aim_pins(x, targets, tile, work, model, timing)
+        if collision is not None:
+            find_pairs(work, model, collision[0], collision[1], collision[2], timing[0])
+        for substep in range(substeps):
+            remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
+            _predict(work, model, timing, second_order)
+            _move_pins(x, targets, tile, work, model, remaining)
+            _project(work, model, collision, timing, second_order)
+            _finish(work, model, timing, second_order)
+        _store(x, v, tile, work)
+
+
+@kernel
+def _world(tile, lane, num_worlds):
+    """Return the world of a lane; lanes beyond the last world repeat it and are not stored."""
+    return min(tile * LANES + lane, num_worlds - 1)
+
+
+@kernel
+def _load(x, v, tile, work):
+    for particle in range(x.shape[1]):
+        row = work[particle]
+        for lane in range(LANES):
+            world = _world(tile, lane, x.shape[0])
+            for k in range(DIM):
+                row[POSITION + k * LANES + lane] = x[world, particle, k]
+                row[VELOCITY + k * LANES + lane] = v[world, particle, k]
+
+
+@kernel
+def _store(x, v, tile, work):
+    for particle in range(x.shape[1]):
+        row = work[particle]
+        for lane in range(min(LANES, x.shape[0] - tile * LANES)):
+            for k in range(DIM):
+                x[tile * LANES + lane, particle, k] = row[POSITION + k * LANES + lane]
+                v[tile * LANES + lane, particle, k] = row[VELOCITY + k * LANES + lane]
+
+
+@kernel
+def _aim_pins(x, targets, tile, work, model, timing):
+    """Give the pins the velocity that brings them to their targets within the control step."""
+    for index in range(model.pins.shape[0]):
+        pin = model.pins[index]
+        for lane in range(LANES):
+            world = _world(tile, lane, x.shape[0])
+            for k in range(DIM):
+                move = targets[world, index, k] - x[world, pin, k]
+                work[pin, VELOCITY + k * LANES + lane] = move / timing[0]
+
+
+@kernel
+def _move_pins(x, targets, tile, work, model, remaining):
+    """Interpolate the pins linearly: a jump would bring in energy that grows with substeps^2."""
+    for index in range(model.pins.shape[0]):
+        pin = model.pins[index]
+        for lane in range(LANES):
+            world = _world(tile, lane, x.shape[0])
+            for k in range(DIM):
+                target = targets[world, index, k]
+                move = target - x[world, pin, k]
+                work[pin, POSITION + k * LANES + lane] = target - move * remaining
+
+
+@kernel
+def _predict(work, model, timing, second_order):
+    """Steps 1-3 of the seed: damp, add the acceleration, move. Second order kicks by half here."""
+    half = work.dtype.type(0.5)
+    h, decay = timing[1], timing[4]
+    for particle in range(model.inverse_mass.shape[0]):
+        row = work[particle]
+        free = model.inverse_mass[particle] > 0
+        for k in range(DIM):
+            kick = model.gravity[k] * h
+            if second_order is not None:
+                kick = kick * half
+            for lane in range(k * LANES, (k + 1) * LANES):
+                row[START + lane] = row[POSITION + lane]
+                if free:
+                    # damping before the kick: it must not lighten what hangs at rest
+                    row[VELOCITY + lane] = row[VELOCITY + lane] * decay + kick
+                    row[POSITION + lane] += row[VELOCITY + lane] * h
+
+
+@kernel
+def _project(work, model, collision, timing, second_order):
+    """Step 4: satisfy the constraints. Soft ones first, chains after them, contacts last."""
+    for iteration in range(model.iterations):
+        if iteration == 0:
+            project_bends(work, model, timing[3])
+        if second_order is not None:
+            project_distances_from_start(work, model, timing[3], iteration)
+            project_chains_from_start(work, model, timing[3], iteration)
+        else:
+            project_distances(work, model, timing[3], iteration)
+            project_chains(work, model, timing[3], iteration)
+    if collision is not None:
+        collide_with_self(work, model, collision[1], collision[2])
+
+
+@kernel
+def _finish(work, model, timing, second_order):
+    """Step 5: walls, then velocities from positions; second order adds its other half kick."""
+    walls = False
+    for k in range(DIM):
+        walls |= model.lower[k] > -np.inf or model.upper[k] < np.inf
+    if walls:
+        collide_with_walls(work, model, timing[2], timing[5])
+    else:
+        read_velocities(work, model, timing[2])
+    if second_order is not None:
+        half = work.dtype.type(0.5)
+        for particle in range(model.inverse_mass.shape[0]):
+            if model.inverse_mass[particle] > 0:
+                row = work[particle]
+                for k in range(DIM):
+                    kick = model.gravity[k] * timing[1] * half
+                    for lane in range(k * LANES, (k + 1) * LANES):
+                        row[VELOCITY + lane] += kick
+        project_distance_velocities(work, model)
+        project_chain_velocities(work, model)

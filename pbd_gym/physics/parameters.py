@@ -1,0 +1,30 @@
+"""A Model as the compiled kernels read it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class Parameters(NamedTuple):
+    """A Model as the kernels read it: the arrays of `pbd_gym.physics.Model` in the state's dtype."""
+
+    inverse_mass: Any
+    gravity: Any
+    pins: Any
+    chain_offsets: Any
+    chain_particles: Any
+    link_rest: Any
+    link_compliance: Any
+    link_compression_compliance: Any
+    distance_pairs: Any
+    distance_rest: Any
+    distance_compliance: Any
+    distance_stiffness: Any
+    bend_triples: Any
+    bend_compliance: Any
+    lower: Any
+    upper: Any
+    contact: Any  # (3,): wall radius [m], restitution, friction
+    collision_particles: Any
+    collision_distance: Any  # (1,) [m]
+    iterations: int

@@ -1,0 +1,157 @@
+"""Ropes, pendulums and cloths: functions that add a body to a ModelBuilder."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pbd_gym.physics.model import Linkage, ModelBuilder, Sheet, Strand
+
+
+def rope(
+    builder: ModelBuilder,
+    start: Any,
+    end: Any,
+    particles: int,
+    *,
+    mass: float,
+    compliance: float = 0.0,
+    bending_stiffness: float = 0.0,
+    radius: float = 0.01,
+) -> np.ndarray:
+    """Add a straight rope whose links are solved directly; nothing is pinned.
+
+    Args:
+        builder: Takes the rope.
+        start: (dim,) of the first particle [m].
+        end: (dim,) of the last particle [m].
+        particles: Number of particles, at least 2.
+        mass: Of the whole rope [kg].
+        compliance: Of a link [m/N]; l/(EA) for links of length l and an axial stiffness EA [N].
+        bending_stiffness: EI [N m2]; 0 bends freely.
+        radius: Drawn [m].
+
+    Returns:
+        The particles' indices, from start to end.
+
+    Raises:
+        ValueError: If there are fewer than 2 particles.
+    """
+    if particles < 2:
+        raise ValueError(f"particles is {particles}; a rope has at least 2")
+    share = np.linspace(0.0, 1.0, particles)[:, None]
+    first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    indices = builder.add_particles(first + share * (last - first), mass / particles)
+    builder.add_chain(indices, compliance=compliance)
+    if bending_stiffness > 0.0:
+        link = float(np.sqrt(np.sum((last - first) ** 2))) / (particles - 1)
+        for a, b, c in zip(indices, indices[1:], indices[2:], strict=False):
+            builder.add_bend(a, b, c, compliance=link**3 / bending_stiffness)
+    builder.add_body(Strand(tuple(map(int, indices)), radius))
+    return indices
+
+
+def pendulum(
+    builder: ModelBuilder,
+    pivot: Any,
+    lengths: Any,
+    masses: Any,
+    *,
+    radius: float = 0.01,
+) -> np.ndarray:
+    """Add an n-link pendulum that hangs down from a pinned pivot.
+
+    Args:
+        builder: Takes the pendulum.
+        pivot: (dim,) of the pivot [m].
+        lengths: (n,) of the links [m].
+        masses: (n,) of the bobs [kg].
+        radius: Of the drawn rods [m].
+
+    Returns:
+        The particles' indices: the pivot, then the bobs from top to bottom.
+
+    Raises:
+        ValueError: If there is not one mass per link.
+    """
+    if len(lengths) != len(masses):
+        raise ValueError(f"{len(lengths)} lengths and {len(masses)} masses; expected one each")
+    at = np.array(pivot, dtype=np.float64)
+    indices = [builder.add_particles(at, 1.0, pinned=True)[0]]
+    for length, mass in zip(lengths, masses, strict=True):
+        at[-1] -= length
+        indices.append(builder.add_particles(at, mass)[0])
+    builder.add_chain(indices, rest=lengths)
+    builder.add_body(Linkage(tuple(map(int, indices)), radius))
+    return np.array(indices)
+
+
+def cloth(
+    builder: ModelBuilder,
+    corner: Any,
+    along_rows: Any,
+    along_columns: Any,
+    shape: tuple[int, int],
+    *,
+    mass: float,
+    stretch_compliance: float = 1e-6,
+    compression_compliance: float | None = None,
+    shear_compliance: float = 1e-3,
+    bending_compliance: float = 1e-1,
+    collision_distance: float = 0.0,
+    radius: float = 0.002,
+) -> np.ndarray:
+    """Add a flat rectangular cloth woven of threads; nothing is pinned.
+
+    Each row and each column is a thread, solved directly as a chain. Shear (both diagonals of each
+    cell) and bending (along the threads) are soft.
+
+    Args:
+        builder: Takes the cloth.
+        corner: (3,) of particle (0, 0) [m].
+        along_rows: (3,) from row 0 to the last row [m].
+        along_columns: (3,) from column 0 to the last column [m].
+        shape: Rows and columns, at least 2 each.
+        mass: Of the whole cloth [kg].
+        stretch_compliance: Of a link under tension [m/N].
+        compression_compliance: Of a link under compression [m/N]; as under tension where None.
+        shear_compliance: Of a diagonal [m/N].
+        bending_compliance: l^3/EI [m/N].
+        collision_distance: That the particles keep from each other [m]; 0 for none.
+        radius: Half the drawn thickness [m].
+
+    Returns:
+        The particles' indices, (rows, columns).
+
+    Raises:
+        ValueError: If the cloth has fewer than 2 rows or columns.
+    """
+    rows, columns = shape
+    if rows < 2 or columns < 2:
+        raise ValueError(f"shape is {shape}; a cloth has at least 2 rows and 2 columns")
+    down = np.linspace(0.0, 1.0, rows)[:, None, None] * np.asarray(along_rows, dtype=np.float64)
+    across = np.linspace(0.0, 1.0, columns)[:, None] * np.asarray(along_columns, dtype=np.float64)
+    points = np.asarray(corner, dtype=np.float64) + down + across
+    indices = builder.add_particles(points.reshape(-1, 3), mass / (rows * columns))
+    grid = indices.reshape(rows, columns)
+    _shear(builder, grid, shear_compliance)
+    for thread in (*grid, *grid.T):
+        for a, b, c in zip(thread, thread[1:], thread[2:], strict=False):
+            builder.add_bend(a, b, c, compliance=bending_compliance)
+        builder.add_chain(
+            thread,
+            compliance=stretch_compliance,
+            compression_compliance=compression_compliance,
+        )
+    if collision_distance > 0.0:
+        builder.set_self_collision(indices, collision_distance)
+    builder.add_body(Sheet(tuple(tuple(map(int, row)) for row in grid), radius))
+    return grid
+
+
+def _shear(builder: ModelBuilder, grid: np.ndarray, compliance: float) -> None:
+    """Hold both diagonals of every cell."""
+    for a, b in ((grid[:-1, :-1], grid[1:, 1:]), (grid[:-1, 1:], grid[1:, :-1])):
+        for i, j in zip(a.ravel(), b.ravel(), strict=True):
+            builder.add_distance(int(i), int(j), compliance=compliance)
