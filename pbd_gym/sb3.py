@@ -87,7 +87,7 @@ class SB3VecEnv(VecEnv):
         if any(other != options for other in self._options):
             raise ValueError("options must be the same for all worlds of a batch")
         observation, info = self.env.reset(seed=seeds, options=options or None)
-        self.reset_infos = [_world_info(info, world) for world in range(self.num_envs)]
+        self.reset_infos = _world_infos(info, np.arange(self.num_envs))
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0.0
@@ -105,22 +105,30 @@ class SB3VecEnv(VecEnv):
         self._lengths += 1
         done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for world in np.flatnonzero(done).tolist():
-            infos[world] = self._final_info(info, world, timed_out=not terminated[world])
-        self._returns[done] = 0.0
-        self._lengths[done] = 0
+        if done.any():
+            self._finish_episodes(np.flatnonzero(done), terminated, info, infos)
         return observation, reward.astype(np.float32), done, infos  # PPO writes into the reward
 
-    def _final_info(self, info: dict[str, Any], world: int, timed_out: bool) -> dict[str, Any]:
-        return _world_info(info["final_info"], world) | {
-            "terminal_observation": info["final_obs"][world],
-            "TimeLimit.truncated": timed_out,
-            "episode": {
-                "r": float(self._returns[world]),
-                "l": int(self._lengths[world]),
-                "t": time.time() - self._created,
-            },
-        }
+    def _finish_episodes(
+        self, worlds: np.ndarray, terminated: np.ndarray, info: dict, infos: list[dict[str, Any]]
+    ) -> None:
+        """Fill the infos of the `worlds` whose episode has ended, and zero their statistics."""
+        seconds = time.time() - self._created
+        episodes = zip(
+            worlds.tolist(),
+            _world_infos(info["final_info"], worlds),
+            (~terminated[worlds]).tolist(),
+            self._returns[worlds].tolist(),
+            self._lengths[worlds].tolist(),
+            strict=True,
+        )
+        for world, final_info, timed_out, total, length in episodes:
+            final_info["terminal_observation"] = info["final_obs"][world]
+            final_info["TimeLimit.truncated"] = timed_out
+            final_info["episode"] = {"r": total, "l": length, "t": seconds}
+            infos[world] = final_info
+        self._returns[worlds] = 0.0
+        self._lengths[worlds] = 0
 
     def get_state(self) -> dict[str, Any]:
         """Return everything the next steps depend on, as an object that can be pickled."""
@@ -175,10 +183,16 @@ class SB3VecEnv(VecEnv):
         return [issubclass(wrapper_class, Monitor) for _ in self._get_indices(indices)]
 
 
-def _world_info(info: dict[str, Any], world: int) -> dict[str, Any]:
-    """Take one world's entries out of Gymnasium's dict of arrays with `_key` masks."""
-    return {
-        key: value[world].item() if np.isscalar(value[world]) else value[world]
-        for key, value in info.items()
-        if not key.startswith("_") and info[f"_{key}"][world]
-    }
+def _world_infos(info: dict[str, Any], worlds: np.ndarray) -> list[dict[str, Any]]:
+    """Turn Gymnasium's dict of arrays with `_key` masks into one dict for each of `worlds`."""
+    infos: list[dict[str, Any]] = [{} for _ in worlds]
+    for key, values in info.items():
+        if key.startswith("_"):
+            continue
+        chosen = values[worlds]
+        entries = chosen.tolist() if chosen.ndim == 1 else list(chosen)
+        present = info[f"_{key}"][worlds].tolist()
+        for world_info, entry, has_entry in zip(infos, entries, present, strict=True):
+            if has_entry:
+                world_info[key] = entry
+    return infos
