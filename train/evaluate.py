@@ -17,6 +17,7 @@ from config import DEFAULT_ENV, load_config
 from policies import make_policy
 from rollouts import make_batch, report, run_episodes
 from run_directory import RunDirectory
+from video import check_video, record_video
 
 EXAMPLES = """\
 examples:
@@ -77,6 +78,8 @@ def evaluate(options: argparse.Namespace) -> None:
     for file in (options.video, options.json):
         if file is not None and not file.parent.is_dir():
             raise FileNotFoundError(f"there is no folder {file.parent} to write {file.name} into")
+    if options.video is not None:
+        check_video(options.video)
     name, env_id, env_kwargs = resolve(options)
     env = make_batch(env_id, options.episodes, env_kwargs)
     policy = make_policy(name, env, seed=options.seed)
@@ -87,8 +90,6 @@ def evaluate(options: argparse.Namespace) -> None:
     if options.json is not None:
         options.json.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     if options.video is not None:
-        from video import record_video
-
         record_video(options.video, env_id, name, env_kwargs, seed=options.seed)
         print(options.video)
 

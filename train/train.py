@@ -23,7 +23,10 @@ from config import (
     new_config,
     save_config,
 )
+from policies import make_policy
+from rollouts import make_batch, report, run_episodes
 from run_directory import RunDirectory
+from video import check_video, record_video
 
 from pbd_gym.hyperparams import ALGORITHMS
 
@@ -176,10 +179,12 @@ def start_run(given: dict[str, Any]) -> tuple[RunDirectory, TrainingConfig, Trai
     options = dict(given)
     overwrite = options.pop("overwrite", False)
     log_dir = options.pop("log_dir", Path("runs"))
-    options.pop("video", None)
+    film = options.pop("video", True)
     config = new_config(options)
     run = RunDirectory(log_dir / f"{config.env_name}-{config.algo}-{config.seed}")
     run.check_free(overwrite)
+    if film:
+        check_video(run.video)
 
     from training import Training
 
@@ -196,6 +201,8 @@ def resume_run(given: dict[str, Any]) -> tuple[RunDirectory, TrainingConfig, Tra
         raise ValueError(f"{names} cannot be given with --resume: a run keeps its settings")
     run = RunDirectory(given["resume"])
     run.check_resumable()
+    if given.get("video", True):
+        check_video(run.video)
     config, versions = load_config(run.config)
     config = replace(config, total_timesteps=given.get("total_timesteps", config.total_timesteps))
     changed = [name for name, version in installed_versions().items() if versions[name] != version]
@@ -216,8 +223,6 @@ def resume_run(given: dict[str, Any]) -> tuple[RunDirectory, TrainingConfig, Tra
 
 def finish(run: RunDirectory, config: TrainingConfig, *, video: bool) -> None:
     """Evaluate the final policy over 100 fresh episodes, and film it."""
-    from policies import make_policy
-    from rollouts import make_batch, report, run_episodes
     from training import independent_seeds
 
     seed = independent_seeds(config.seed)["final"]
@@ -229,8 +234,6 @@ def finish(run: RunDirectory, config: TrainingConfig, *, video: bool) -> None:
     run.evaluation.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     print(report(summary, f"{run.path.name}, {run.chosen_model.name}"))
     if video:
-        from video import record_video
-
         record_video(run.video, config.env, str(run.chosen_model), config.env_kwargs, seed=seed)
     files = (run.chosen_model, run.curve_picture, *([run.video] if video else []))
     print("\n".join(str(file) for file in files))
