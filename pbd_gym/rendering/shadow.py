@@ -1,0 +1,62 @@
+"""Where the bodies of a model cast their shadows on the floor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbd_gym.physics.model import Body, Linkage, Model, Sheet
+from pbd_gym.rendering.canvas import ribbon
+from pbd_gym.rendering.curves import finite_runs
+from pbd_gym.rendering.scene import bob_radius, particles_of
+
+
+def shadow_patches(model: Model, x: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the shadows that a lamp far away casts on the floor, the darkest last.
+
+    Args:
+        model: Whose bodies cast them; its floor must be finite.
+        x: Positions (N, 3) [m]; what is not finite casts none.
+        light: Unit vector towards the lamp (3,).
+
+    Returns:
+        Quadrilaterals on the floor (Q, 4, 3) [m], and how high above the floor each was cast from
+        (Q,) [m].
+    """
+    floor = float(model.lower[2])
+    height = np.maximum(x[:, 2] - floor, 0.0)
+    dropped = x - height[:, None] / light[2] * light
+    dropped[:, 2] = floor
+    patches, heights = [np.zeros((0, 4, 3))], [np.zeros(0)]
+    for body in model.bodies:
+        for corners, high in _casters(model, body, dropped, height):
+            patches.append(corners)
+            heights.append(high)
+    corners, high = np.concatenate(patches), np.concatenate(heights)
+    order = np.argsort(-high, kind="stable")
+    order = order[np.isfinite(corners[order]).all(axis=(1, 2))]
+    return corners[order], high[order]
+
+
+def _casters(
+    model: Model, body: Body, dropped: np.ndarray, height: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return patches and heights of one body, given each particle's shadow and height."""
+    particles = particles_of(body)
+    if isinstance(body, Sheet):
+        cells = np.stack(
+            [particles[:-1, :-1], particles[:-1, 1:], particles[1:, 1:], particles[1:, :-1]], axis=2
+        ).reshape(-1, 4)
+        return [(dropped[cells], height[cells].mean(axis=1))]
+    casters = []
+    for run in finite_runs(np.column_stack([dropped[particles], height[particles]])):
+        flat = ribbon(run[:, :2], 2.0 * body.radius)
+        floor = np.broadcast_to(run[0, 2], (*flat.shape[:2], 1))
+        high = (run[1:, 3] + run[:-1, 3]) / 2.0
+        casters.append((np.concatenate([flat, floor], axis=2), high))
+    if isinstance(body, Linkage):
+        # Two crossed squares pass for a disc once they are blurred.
+        angles = np.radians([[0, 90, 180, 270], [45, 135, 225, 315]])
+        rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=2)
+        for particle, radius in zip(particles, bob_radius(model, body), strict=True):
+            casters.append((dropped[particle] + radius * rim, np.full(2, height[particle])))
+    return casters

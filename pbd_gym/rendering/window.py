@@ -1,0 +1,91 @@
+"""A window that shows pictures as they come, in real time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pbd_gym.rendering.canvas import load_pygame
+from pbd_gym.rendering.palette import PAPER
+from pbd_gym.rendering.video import check_frame
+
+if TYPE_CHECKING:
+    import pygame
+
+
+class Window:
+    """Shows frames in a resizable window, no faster than `fps`.
+
+    It opens with the first frame. When the user closes it, or presses Escape, it stays closed:
+    `closed` is True from then on and further frames are ignored. A process has one such window.
+
+    Args:
+        fps: Frames per second; 0 for as fast as they come.
+        title: In the bar of the window.
+
+    Attributes:
+        closed: Whether the window has been closed, by the user or by `close`.
+    """
+
+    def __init__(self, fps: float, *, title: str = "pbd_gym") -> None:
+        if not (np.isfinite(fps) and fps >= 0.0):
+            raise ValueError(f"fps is {fps!r}; it must be finite and at least 0")
+        self.closed = False
+        self._fps = fps
+        self._title = title
+        self._clock: pygame.time.Clock | None = None
+
+    def __enter__(self) -> Window:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def show(self, frame: np.ndarray) -> None:
+        """Show a picture (height, width, 3) of uint8, scaled to the window, and wait for its time.
+
+        Raises:
+            ValueError: If it is no such picture.
+        """
+        check_frame(frame)
+        if self.closed:
+            return
+        pygame = load_pygame()
+        height, width = frame.shape[:2]
+        clock = self._clock
+        if clock is None:
+            pygame.display.init()
+            pygame.display.set_mode((width, height), pygame.RESIZABLE)
+            pygame.display.set_caption(self._title)
+            clock = self._clock = pygame.time.Clock()
+        if self._is_left():
+            self.close()
+            return
+        picture = pygame.image.frombuffer(frame.tobytes(), (width, height), "RGB")
+        screen = pygame.display.get_surface()
+        share = min(screen.get_width() / width, screen.get_height() / height)
+        if share != 1.0:
+            fitted = (max(round(width * share), 1), max(round(height * share), 1))
+            picture = pygame.transform.smoothscale(picture, fitted)
+        screen.fill(PAPER)
+        screen.blit(picture, picture.get_rect(center=screen.get_rect().center))
+        pygame.display.flip()
+        clock.tick(self._fps)
+
+    def close(self) -> None:
+        """Close the window; doing so twice does no harm."""
+        if self._clock is not None and not self.closed:
+            load_pygame().display.quit()
+        self.closed = True
+
+    def _is_left(self) -> bool:
+        """Whether the user wants to leave, or somebody else has shut pygame down."""
+        pygame = load_pygame()
+        if not pygame.display.get_init() or pygame.display.get_surface() is None:
+            return True
+        return any(
+            event.type == pygame.QUIT
+            or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE)
+            for event in pygame.event.get()
+        )
