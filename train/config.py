@@ -80,7 +80,7 @@ def save_config(path: Path, config: TrainingConfig) -> None:
 def load_config(path: Path) -> tuple[TrainingConfig, dict[str, str]]:
     """Read back the settings and the versions of what they ran with."""
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    versions = content.pop("versions")
+    versions = content.pop("versions", {})
     return TrainingConfig(**content), versions
 
 

@@ -205,7 +205,9 @@ def resume_run(given: dict[str, Any]) -> tuple[RunDirectory, TrainingConfig, Tra
         check_video(run.video)
     config, versions = load_config(run.config)
     config = replace(config, total_timesteps=given.get("total_timesteps", config.total_timesteps))
-    changed = [name for name, version in installed_versions().items() if versions[name] != version]
+    changed = [
+        name for name, version in installed_versions().items() if versions.get(name) != version
+    ]
     if changed:
         print(f"other versions than at the start, bits may differ: {', '.join(changed)}")
 
