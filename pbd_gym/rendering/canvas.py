@@ -16,8 +16,6 @@ from pbd_gym.rendering.palette import Colour
 if TYPE_CHECKING:
     import pygame
 
-# Shadows are soft, so a coarse layer does: [canvas pixels] of a pixel there, as drawn and blurred.
-_DRAWN, _BLURRED = 4, 8
 _PROMPT = "PYGAME_HIDE_SUPPORT_PROMPT"
 
 
@@ -52,8 +50,9 @@ class Canvas:
 
     def __init__(self, size: tuple[int, int]) -> None:
         self._pygame = load_pygame()
-        # Large pictures need less smoothing and would pay most for it.
-        self._supersampling = 3 if max(size) <= 640 else 2
+        # Large pictures need less smoothing and would pay most for it. Powers of two, because
+        # smoothscale divides exactly by them and else darkens the picture by a shade.
+        self._supersampling = 4 if max(size) <= 512 else 2
         self.size = (size[0] * self._supersampling, size[1] * self._supersampling)
         self.unit = min(self.size) / 512.0
         self.surface = self._new_surface(self.size)
@@ -184,27 +183,30 @@ class Canvas:
         """
         if not len(polygons):
             return
+        # Shadows are soft, so coarse layers do: [canvas pixels] of a pixel as drawn and as blurred.
+        drawn = max(round(2.0 * self.unit), 1)
+        blurred = 2 * drawn
         if self._shadow_layer is None:
-            width, height = (-(-side // _BLURRED) * _BLURRED // _DRAWN for side in self.size)
+            width, height = (-(-side // blurred) * 2 for side in self.size)
             self._shadow_layer = self._new_surface((width, height), alpha=True)
         layer, smoothscale = self._shadow_layer, self._pygame.transform.smoothscale
         layer.fill((*colour, 0))
         alphas = np.rint(255 * opacity).astype(int).tolist()
-        corners = np.rint(polygons / _DRAWN).astype(int).tolist()
+        corners = np.rint(polygons / drawn).astype(int).tolist()
         for polygon, alpha in zip(corners, alphas, strict=True):
             self._pygame.draw.polygon(layer, (*colour, alpha), polygon)
-        box = self.around(polygons.reshape(-1, 2), 3.0 * _BLURRED)
-        left, top = box.left // _BLURRED, box.top // _BLURRED
-        width, height = -(-box.right // _BLURRED) - left, -(-box.bottom // _BLURRED) - top
+        box = self.around(polygons.reshape(-1, 2), 3.0 * blurred)
+        left, top = box.left // blurred, box.top // blurred
+        width, height = -(-box.right // blurred) - left, -(-box.bottom // blurred) - top
         if not (width and height):
             return
-        part = layer.subsurface([_BLURRED // _DRAWN * v for v in (left, top, width, height)])
+        part = layer.subsurface([2 * v for v in (left, top, width, height)])
         coarse = smoothscale(part, (width, height))
         alpha = self._pygame.surfarray.pixels_alpha(coarse)
-        alpha[...] = _blurred(_blurred(alpha.astype(np.float32)).T).T
+        alpha[...] = _smoothed(_smoothed(alpha.astype(np.float32)).T).T
         del alpha  # it locks the surface
-        soft = smoothscale(coarse, (width * _BLURRED, height * _BLURRED))
-        self.touch(self.surface.blit(soft, (left * _BLURRED, top * _BLURRED)))
+        soft = smoothscale(coarse, (width * blurred, height * blurred))
+        self.touch(self.surface.blit(soft, (left * blurred, top * blurred)))
 
     def _new_surface(self, size: tuple[int, int], *, alpha: bool = False) -> pygame.Surface:
         """Return a surface whose bytes are red, green, blue, alpha on every machine and display."""
@@ -224,7 +226,7 @@ def ribbon(points: np.ndarray, width: float | np.ndarray) -> np.ndarray:
     return np.stack([start + side, end + side, end - side, start - side], axis=1)
 
 
-def _blurred(values: np.ndarray) -> np.ndarray:
+def _smoothed(values: np.ndarray) -> np.ndarray:
     """Return values (M, K) averaged along the first axis with weights 1, 4, 6, 4, 1."""
     padded = np.pad(values, ((2, 2), (0, 0)))
     ends, inner = padded[:-4] + padded[4:], padded[1:-3] + padded[3:-1]

@@ -47,13 +47,15 @@ class DisplayList:
             return
         between = (depth[1:] + depth[:-1]) / 2.0
         thick = self._canvas.unit * _EDGE
-        for colour, extra, behind in ((edge, thick, radius), (fill, -thick, 0.0)):
-            widths = [2.0 * self._pixel_radius(radius, d) + extra for d in depth]
-            quads = ribbon(pixels, np.array(widths)[1:])
+        # The edge lies so far behind that it hides nothing of the neighbouring pieces.
+        behind = 2.0 * radius + float(np.abs(np.diff(depth)).max(initial=0.0))
+        for colour, extra, back in ((edge, thick, behind), (fill, -thick, 0.0)):
+            widths = np.array([2.0 * self._pixel_radius(radius, d) + extra for d in depth])
+            quads = ribbon(pixels, widths[1:])
             colours = np.broadcast_to(np.array(colour), (len(quads), 3))
-            self._add_polygons(quads, between + behind, colours)
+            self._add_polygons(quads, between + back, colours)
             for pixel, width, d in zip(pixels, widths, depth, strict=True):
-                self._add(d + behind, self._canvas.disc, (pixel, width / 2.0, colour))
+                self._add(d + back, self._canvas.disc, (pixel, width / 2.0, colour))
 
     def add_ball(self, centre: np.ndarray, radius: float, fill: Colour, edge: Colour) -> None:
         """Add a ball (3,) [m] with a highlight, of a radius [m] and never too small to see."""

@@ -26,6 +26,8 @@ from pbd_gym.rendering.weave import weave
 _MARGIN = 0.06
 _AZIMUTH, _ELEVATION = float(np.radians(-62.0)), float(np.radians(32.0))
 _LIGHT = np.array([-0.45, -0.35, 1.0]) / np.linalg.norm([-0.45, -0.35, 1.0])  # towards the lamp
+_SOLID = (palette.BLUE, palette.DARK_BLUE)  # fill and edge of what is there
+_GHOSTLY = (palette.ORANGE, palette.DARK_ORANGE)  # and of what shall be there
 _DARKEST = 0.42  # opacity of a shadow that its body touches
 _PATCHES = 24  # a cloth is drawn with about this many patches along each side
 
@@ -62,7 +64,7 @@ class SpatialPainter:
             for body in bodies:
                 self._paint_ghost(body, goal)
             for sheet in sheets:
-                self._paint_rim(sheet, goal, 0.9)
+                self._paint_rim(sheet, goal)
             for centre in goal[singles]:
                 self._paint_goal(centre, goal_radius)
         if np.isfinite(model.lower[2]):
@@ -70,25 +72,29 @@ class SpatialPainter:
         self._paint_bodies(x, singles)
         if goal is not None:
             for sheet in sheets:
-                self._paint_rim(sheet, goal, 0.4)
+                pixels, _ = self.camera.project(goal[particles_of(sheet).ravel()])
+                with self._canvas.translucent(0.4, pixels, 4.0 * self._canvas.unit):
+                    self._paint_rim(sheet, goal)
 
     def _paint_bodies(self, x: np.ndarray, with_goal: np.ndarray) -> None:
         scene = DisplayList(self._canvas, self.camera)
         for body in self._model.bodies:
-            self._add_body(scene, body, x)
+            self._add_body(scene, body, x, ghost=False)
         for point in x[loose_particles(self._model)]:
-            scene.add_ball(point, 0.0, palette.BLUE, palette.DARK_BLUE)
+            scene.add_ball(point, 0.0, *_SOLID)
         for point in x[with_goal]:
-            scene.add_ball(point, 0.0, palette.ORANGE, palette.DARK_ORANGE)
+            scene.add_ball(point, 0.0, *_GHOSTLY)
         for point in x[self._model.pins]:
             scene.add_gripper(point)
         scene.draw()
 
-    def _add_body(self, scene: DisplayList, body: Body, x: np.ndarray) -> None:
+    def _add_body(self, scene: DisplayList, body: Body, x: np.ndarray, *, ghost: bool) -> None:
+        """Add a body at positions (N, 3) [m], or the ghost that shows where it shall go."""
         points = x[particles_of(body)]
+        fill, edge = _GHOSTLY if ghost else _SOLID
         if isinstance(body, Sheet):
-            pieces = max(1, round(_PATCHES / max(points.shape[:2])))
-            sides = (palette.CLOTH_BLUE, palette.PALE_BLUE)
+            pieces = 1 if ghost else max(1, round(_PATCHES / max(points.shape[:2])))
+            sides = (fill, fill) if ghost else (palette.CLOTH_BLUE, palette.PALE_BLUE)
             scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides))
             return
         if isinstance(body, Linkage):
@@ -96,32 +102,28 @@ class SpatialPainter:
                 scene.add_line(run, body.radius, palette.STEEL, palette.DARK_STEEL)
             for point, radius in zip(points, bob_radius(self._model, body), strict=True):
                 if radius > 0.0:
-                    scene.add_ball(point, radius, palette.BLUE, palette.DARK_BLUE)
+                    scene.add_ball(point, radius, fill, edge)
             return
         for run in finite_runs(points):
-            scene.add_line(smooth_line(run, 3), body.radius, palette.BLUE, palette.DARK_BLUE)
+            scene.add_line(smooth_line(run, 3), body.radius, fill, edge)
 
     def _paint_ghost(self, body: Body, goal: np.ndarray) -> None:
         """Draw a body where all its particles shall go."""
-        points = goal[particles_of(body)]
         scene = DisplayList(self._canvas, self.camera)
-        if isinstance(body, Sheet):
-            sides = (palette.ORANGE, palette.ORANGE)
-            scene.add_mesh(*weave(points, 1, self.camera.eye, _LIGHT, sides))
-        else:
-            scene.add_line(points, body.radius, palette.ORANGE, palette.DARK_ORANGE)
-        pixels, _ = self.camera.project(points.reshape(-1, 3))
-        with self._canvas.translucent(GHOST, pixels, 20.0 * self._canvas.unit):
+        self._add_body(scene, body, goal, ghost=True)
+        pixels, depth = self.camera.project(goal[particles_of(body).ravel()])
+        bob = float(bob_radius(self._model, body).max()) if isinstance(body, Linkage) else 0.0
+        pad = 20.0 * self._canvas.unit + bob * self.camera.scale(float(depth.min()))
+        with self._canvas.translucent(GHOST, pixels, pad):
             scene.draw()
 
-    def _paint_rim(self, sheet: Sheet, goal: np.ndarray, opacity: float) -> None:
-        """Draw the rim of a cloth's goal: under the cloth, and again over it to shine through."""
+    def _paint_rim(self, sheet: Sheet, goal: np.ndarray) -> None:
+        """Draw the rim of a cloth's goal; over the cloth it makes what is covered shine through."""
         grid = particles_of(sheet)
         rim = np.concatenate([grid[0], grid[1:, -1], grid[-1, -2::-1], grid[-2::-1, 0]])
         pixels, _ = self.camera.project(goal[rim])
-        with self._canvas.translucent(opacity, pixels, 4.0 * self._canvas.unit):
-            for run in finite_runs(pixels):
-                self._canvas.stroke(run, 1.6 * self._canvas.unit, palette.DARK_ORANGE)
+        for run in finite_runs(pixels):
+            self._canvas.stroke(run, 1.6 * self._canvas.unit, palette.DARK_ORANGE)
 
     def _paint_goal(self, centre: np.ndarray, goal_radius: float) -> None:
         """Draw where a single particle shall go: the ball around it, seen from anywhere a disc."""
