@@ -11,7 +11,7 @@ all links of the chain at once instead of one after another).
 
 import numpy as np
 
-from ..compiling import kernel
+from ..compiling import kernel, row
 from .layout import (
     COUPLING,
     DIM,
@@ -34,70 +34,80 @@ _FREE = 1e30
 @kernel
 def project_chains(work, model, inverse_h2, iteration):
     """Bring the links of every chain to their lengths, along their current directions."""
-    zero_row = work[work.shape[0] - 1]
-    for chain in range(model.chain_offsets.shape[0] - 1):
-        first, last = model.chain_offsets[chain], model.chain_offsets[chain + 1] - 1
+    offsets, particles = model.chain_offsets, model.chain_particles
+    inverse_mass, rest, compliance = model.inverse_mass, model.link_rest, model.link_compliance
+    compression = model.link_compression_compliance
+    zero_row = row(work, work.shape[0] - 1)
+    for chain in range(offsets.shape[0] - 1):
+        first, last = offsets[chain], offsets[chain + 1] - 1
         before = zero_row
         for entry in range(first, last):
-            row = work[model.chain_particles[entry]]
+            i, j = particles[entry], particles[entry + 1]
+            link = row(work, i)
             _eliminate_current(
                 before,
-                row,
-                work[model.chain_particles[entry + 1]],
-                model.inverse_mass[model.chain_particles[entry]],
-                model.inverse_mass[model.chain_particles[entry + 1]],
-                model.link_rest[entry],
-                _stiffened(model.link_compliance, entry, inverse_h2, iteration),
-                _stiffened(model.link_compression_compliance, entry, inverse_h2, iteration),
+                link,
+                row(work, j),
+                inverse_mass[i],
+                inverse_mass[j],
+                rest[entry],
+                _stiffened(compliance, entry, inverse_h2, iteration),
+                _stiffened(compression, entry, inverse_h2, iteration),
             )
-            before = row
-        _back_substitute(work, model, first, last, POSITION)
+            before = link
+        _back_substitute(work, particles, inverse_mass, first, last, POSITION)
 
 
 @kernel
 def project_chains_from_start(work, model, inverse_h2, iteration):
     """Bring the links to their lengths along their directions at the start of the substep (SHAKE)."""
-    zero_row = work[work.shape[0] - 1]
-    for chain in range(model.chain_offsets.shape[0] - 1):
-        first, last = model.chain_offsets[chain], model.chain_offsets[chain + 1] - 1
-        before, mass_before, rest_before = zero_row, model.link_rest[first] * 0, model.link_rest[first]
+    offsets, particles = model.chain_offsets, model.chain_particles
+    inverse_mass, rest, compliance = model.inverse_mass, model.link_rest, model.link_compliance
+    zero_row = row(work, work.shape[0] - 1)
+    for chain in range(offsets.shape[0] - 1):
+        first, last = offsets[chain], offsets[chain + 1] - 1
+        before, rest_before = zero_row, rest[first]
         for entry in range(first, last):
-            row = work[model.chain_particles[entry]]
+            i, j = particles[entry], particles[entry + 1]
+            link = row(work, i)
             _eliminate_start(
                 before,
-                row,
-                work[model.chain_particles[entry + 1]],
-                model.inverse_mass[model.chain_particles[entry]],
-                model.inverse_mass[model.chain_particles[entry + 1]],
+                link,
+                row(work, j),
+                inverse_mass[i],
+                inverse_mass[j],
                 rest_before,
-                model.link_rest[entry],
-                _stiffened(model.link_compliance, entry, inverse_h2, iteration),
+                rest[entry],
+                _stiffened(compliance, entry, inverse_h2, iteration),
             )
-            before, rest_before = row, model.link_rest[entry]
-        _back_substitute(work, model, first, last, POSITION)
+            before, rest_before = link, rest[entry]
+        _back_substitute(work, particles, inverse_mass, first, last, POSITION)
 
 
 @kernel
 def project_chain_velocities(work, model):
     """Remove the velocity along rigid links (the second half of RATTLE)."""
-    zero_row = work[work.shape[0] - 1]
+    offsets, particles = model.chain_offsets, model.chain_particles
+    inverse_mass, compliance = model.inverse_mass, model.link_compliance
+    zero_row = row(work, work.shape[0] - 1)
     free = work.dtype.type(_FREE)
     zero = work.dtype.type(0)
-    for chain in range(model.chain_offsets.shape[0] - 1):
-        first, last = model.chain_offsets[chain], model.chain_offsets[chain + 1] - 1
+    for chain in range(offsets.shape[0] - 1):
+        first, last = offsets[chain], offsets[chain + 1] - 1
         before = zero_row
         for entry in range(first, last):
-            row = work[model.chain_particles[entry]]
+            i, j = particles[entry], particles[entry + 1]
+            link = row(work, i)
             _eliminate_velocity(
                 before,
-                row,
-                work[model.chain_particles[entry + 1]],
-                model.inverse_mass[model.chain_particles[entry]],
-                model.inverse_mass[model.chain_particles[entry + 1]],
-                zero if model.link_compliance[entry] == zero else free,
+                link,
+                row(work, j),
+                inverse_mass[i],
+                inverse_mass[j],
+                zero if compliance[entry] == zero else free,
             )
-            before = row
-        _back_substitute(work, model, first, last, VELOCITY)
+            before = link
+        _back_substitute(work, particles, inverse_mass, first, last, VELOCITY)
 
 
 @kernel
@@ -113,8 +123,9 @@ def _stiffened(compliance, entry, inverse_h2, iteration):
 @kernel
 def _eliminate_current(before, a, b, mass_a, mass_b, rest, stretch, compression):
     """Eliminate the link before this one; the direction is the current one."""
-    one, zero = a.dtype.type(1), a.dtype.type(0)
-    floor = a.dtype.type(_PIVOT_FLOOR)
+    real = type(mass_a)
+    one, zero = real(1), real(0)
+    floor = real(_PIVOT_FLOOR)
     for lane in range(LANES):
         square = zero
         for k in range(DIM):
@@ -146,8 +157,9 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest_before, rest, alpha):
     with corrections along the start direction the system is no longer symmetric. Where a link has
     turned by 60 degrees or more within the substep, its current direction is taken.
     """
-    one, zero, half = a.dtype.type(1), a.dtype.type(0), a.dtype.type(0.5)
-    floor = a.dtype.type(_PIVOT_FLOOR)
+    real = type(mass_a)
+    one, zero, half = real(1), real(0), real(0.5)
+    floor = real(_PIVOT_FLOOR)
     inverse, inverse_before = one / rest, one / rest_before
     for lane in range(LANES):
         square, aligned = zero, zero
@@ -180,8 +192,9 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest_before, rest, alpha):
 @kernel
 def _eliminate_velocity(before, a, b, mass_a, mass_b, alpha):
     """Eliminate the link before this one; the unknowns are impulses along the links."""
-    one, zero = a.dtype.type(1), a.dtype.type(0)
-    floor = a.dtype.type(_PIVOT_FLOOR)
+    real = type(mass_a)
+    one, zero = real(1), real(0)
+    floor = real(_PIVOT_FLOOR)
     for lane in range(LANES):
         square, rate = zero, zero
         for k in range(DIM):
@@ -205,26 +218,21 @@ def _eliminate_velocity(before, a, b, mass_a, mass_b, alpha):
 
 
 @kernel
-def _back_substitute(work, model, first, last, quantity):
+def _back_substitute(work, particles, inverse_mass, first, last, quantity):
     """Find the multipliers from the last link to the first and move the particles by them."""
-    after = work[work.shape[0] - 1]
+    after = row(work, work.shape[0] - 1)
     for entry in range(last - 1, first - 1, -1):
-        row = work[model.chain_particles[entry]]
-        _apply(
-            row,
-            work[model.chain_particles[entry + 1]],
-            after,
-            model.inverse_mass[model.chain_particles[entry]],
-            model.inverse_mass[model.chain_particles[entry + 1]],
-            quantity,
-        )
-        after = row
+        i, j = particles[entry], particles[entry + 1]
+        link = row(work, i)
+        _apply(link, row(work, j), after, inverse_mass[i], inverse_mass[j], quantity)
+        after = link
 
 
 @kernel
 def _apply(a, b, after, mass_a, mass_b, quantity):
     for lane in range(LANES):
-        step = (a[MULTIPLIER + lane] - after[COUPLING + lane] * after[MULTIPLIER + lane]) * a[PIVOT + lane]
+        above = after[COUPLING + lane] * after[MULTIPLIER + lane]
+        step = (a[MULTIPLIER + lane] - above) * a[PIVOT + lane]
         a[MULTIPLIER + lane] = step
         for k in range(DIM):
             move = step * a[DIRECTION + k * LANES + lane]

@@ -7,7 +7,7 @@ substep, in the order in which they were found.
 
 import numpy as np
 
-from ..compiling import kernel
+from ..compiling import kernel, row
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 
 # Pairs are sought within this many collision distances at most: faster particles would meet
@@ -34,12 +34,13 @@ def find_pairs(work, model, grid, pairs, counts, dt):
 @kernel
 def _reach(work, model, lane, dt):
     """Return the distance within which two particles can meet in dt [m]."""
+    particles = model.collision_particles
     fastest = work.dtype.type(0)
-    for index in range(model.collision_particles.shape[0]):
-        row = work[model.collision_particles[index]]
+    for index in range(particles.shape[0]):
+        at = row(work, particles[index])
         square = work.dtype.type(0)
         for k in range(DIM):
-            square += row[VELOCITY + k * LANES + lane] * row[VELOCITY + k * LANES + lane]
+            square += at[VELOCITY + k * LANES + lane] * at[VELOCITY + k * LANES + lane]
         fastest = max(fastest, square)
     distance = model.collision_distance[0]
     travel = work.dtype.type(2) * np.sqrt(fastest) * dt
@@ -53,15 +54,16 @@ def _sort_into_cells(work, model, lane, reach, grid):
     Rows of grid: 0 first entry of a bucket, 1 sorted particles, 2 bucket of a particle, 3 fill
     marks, 4... cell coordinates of a particle.
     """
-    count = model.collision_particles.shape[0]
+    particles = model.collision_particles
+    count = particles.shape[0]
     buckets = grid.shape[1] - 1
     limit = work.dtype.type(_LAST_CELL)
     for bucket in range(buckets + 1):
         grid[0, bucket] = 0
     for index in range(count):
-        row = work[model.collision_particles[index]]
+        at = row(work, particles[index])
         for k in range(DIM):
-            cell = np.floor(row[POSITION + k * LANES + lane] / reach)
+            cell = np.floor(at[POSITION + k * LANES + lane] / reach)
             if not abs(cell) < limit:
                 return False
             grid[4 + k, index] = np.int64(cell)
@@ -97,16 +99,19 @@ def _offset(neighbour, k):
 
 @kernel
 def _list_pairs(work, model, lane, reach, grid, pairs):
+    particles = model.collision_particles
+    zero = work.dtype.type(0)
     found = 0
-    for index in range(model.collision_particles.shape[0]):
-        particle = model.collision_particles[index]
+    for index in range(particles.shape[0]):
+        particle = particles[index]
         for neighbour in range(3**DIM):
             bucket = _bucket(grid, index, neighbour, grid.shape[1] - 1)
             for entry in range(grid[0, bucket], grid[0, bucket + 1]):
                 other = grid[1, entry]
                 if other > index and _in_cell(grid, index, other, neighbour):
-                    other_particle = model.collision_particles[other]
-                    square = _square_distance(work[particle], work[other_particle], lane)
+                    other_particle = particles[other]
+                    a, b = row(work, particle), row(work, other_particle)
+                    square = _square_distance(a, b, lane, zero)
                     if square < reach * reach and found < pairs.shape[0]:
                         pairs[found, 0] = particle
                         pairs[found, 1] = other_particle
@@ -124,8 +129,8 @@ def _in_cell(grid, index, other, neighbour):
 
 
 @kernel
-def _square_distance(a, b, lane):
-    square = a.dtype.type(0)
+def _square_distance(a, b, lane, zero):
+    square = zero
     for k in range(DIM):
         delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
         square += delta * delta
@@ -136,29 +141,30 @@ def _square_distance(a, b, lane):
 def collide_with_self(work, model, pairs, counts):
     """Push the listed pairs apart to the collision distance, with friction between them."""
     zero, one = work.dtype.type(0), work.dtype.type(1)
+    inverse_mass = model.inverse_mass
     distance = model.collision_distance[0]
     friction = model.contact[2]
     for lane in range(LANES):
         for index in range(counts[lane]):
             i, j = pairs[lane, index, 0], pairs[lane, index, 1]
-            a, b = work[i], work[j]
-            square = _square_distance(a, b, lane)
-            total = model.inverse_mass[i] + model.inverse_mass[j]
+            a, b = row(work, i), row(work, j)
+            square = _square_distance(a, b, lane, zero)
+            total = inverse_mass[i] + inverse_mass[j]
             if zero < square < distance * distance and total > zero:
                 length = np.sqrt(square)
                 depth = distance - length
                 push = depth / (length * total)
                 for k in range(DIM):
                     move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
-                    a[POSITION + k * LANES + lane] += model.inverse_mass[i] * move
-                    b[POSITION + k * LANES + lane] -= model.inverse_mass[j] * move
-                _rub(a, b, lane, model.inverse_mass[i], model.inverse_mass[j], friction * depth, one)
+                    a[POSITION + k * LANES + lane] += inverse_mass[i] * move
+                    b[POSITION + k * LANES + lane] -= inverse_mass[j] * move
+                _rub(a, b, lane, inverse_mass[i], inverse_mass[j], friction * depth, one)
 
 
 @kernel
 def _rub(a, b, lane, mass_a, mass_b, held, one):
     """Coulomb friction of a touching pair: hold back its tangential slide of this substep."""
-    zero = a.dtype.type(0)
+    zero = type(held)(0)
     normal_slide, square, gap = zero, zero, zero
     for k in range(DIM):
         at = k * LANES + lane

@@ -2,18 +2,19 @@
 
 import numpy as np
 
-from ..compiling import kernel
+from ..compiling import kernel, row
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 
 
 @kernel
 def read_velocities(work, model, inverse_h):
     """Read the velocities off the moved positions, v = (x - x_start)/h: no walls in this world."""
-    for particle in range(model.inverse_mass.shape[0]):
-        if model.inverse_mass[particle] > 0:
-            row = work[particle]
+    inverse_mass = model.inverse_mass
+    for particle in range(inverse_mass.shape[0]):
+        if inverse_mass[particle] > 0:
+            at = row(work, particle)
             for lane in range(DIM * LANES):
-                row[VELOCITY + lane] = (row[POSITION + lane] - row[START + lane]) * inverse_h
+                at[VELOCITY + lane] = (at[POSITION + lane] - at[START + lane]) * inverse_h
 
 
 @kernel
@@ -22,57 +23,59 @@ def collide_with_walls(work, model, inverse_h, rest_speed):
 
     rest_speed [m/s]: slower impacts do not bounce, else gravity alone would make resting particles hop.
     """
-    restitution = model.contact[1]
-    for particle in range(model.inverse_mass.shape[0]):
-        if model.inverse_mass[particle] > 0:
-            row = work[particle]
+    inverse_mass, lower_wall, upper_wall = model.inverse_mass, model.lower, model.upper
+    radius, restitution, friction = model.contact[0], model.contact[1], model.contact[2]
+    for particle in range(inverse_mass.shape[0]):
+        if inverse_mass[particle] > 0:
+            at = row(work, particle)
             for axis in range(DIM):
-                lower = model.lower[axis] + model.contact[0]
-                upper = model.upper[axis] - model.contact[0]
-                _stop_at_walls(row, axis, lower, upper, model.contact[2])
+                lower = lower_wall[axis] + radius
+                upper = upper_wall[axis] - radius
+                _stop_at_walls(at, axis, lower, upper, friction)
             for axis in range(DIM):
-                lower = model.lower[axis] + model.contact[0]
-                upper = model.upper[axis] - model.contact[0]
-                _bounce(row, axis, lower, upper, restitution, rest_speed, inverse_h)
+                lower = lower_wall[axis] + radius
+                upper = upper_wall[axis] - radius
+                _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h)
 
 
 @kernel
-def _stop_at_walls(row, axis, lower, upper, friction):
+def _stop_at_walls(at, axis, lower, upper, friction):
     """Clamp one coordinate; Coulomb friction holds back the others (Macklin et al. 2014, eq. 23-24)."""
-    one, zero = row.dtype.type(1), row.dtype.type(0)
+    real = type(friction)
+    one, zero = real(1), real(0)
     for lane in range(LANES):
-        before = row[POSITION + axis * LANES + lane]
+        before = at[POSITION + axis * LANES + lane]
         after = min(max(before, lower), upper)
         depth = abs(after - before)
-        row[POSITION + axis * LANES + lane] = after
+        at[POSITION + axis * LANES + lane] = after
         square = zero
         for k in range(DIM):
-            slide = row[POSITION + k * LANES + lane] - row[START + k * LANES + lane]
+            slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
             square += slide * slide if k != axis else zero
         distance = np.sqrt(square)
         held = friction * depth
         # static: the whole slide is taken back; kinetic: as much as friction can hold
         share = min(held / distance, one) if distance > zero else zero
         for k in range(DIM):
-            slide = row[POSITION + k * LANES + lane] - row[START + k * LANES + lane]
-            row[POSITION + k * LANES + lane] -= share * slide if k != axis else zero
+            slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
+            at[POSITION + k * LANES + lane] -= share * slide if k != axis else zero
 
 
 @kernel
-def _bounce(row, axis, lower, upper, restitution, rest_speed, inverse_h):
+def _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h):
     """Read the velocity of one axis; at a wall it is the restituted one (Mueller et al. 2020, eq. 34).
 
     The speed before the impact is the predicted one, gravity's kick included. Setting the outward
     velocity instead of reading it off also lets overlapping particles out without a launch.
     """
-    zero = row.dtype.type(0)
+    zero = type(restitution)(0)
     for lane in range(LANES):
-        position = row[POSITION + axis * LANES + lane]
-        impact = row[VELOCITY + axis * LANES + lane]
-        speed = (position - row[START + axis * LANES + lane]) * inverse_h
+        position = at[POSITION + axis * LANES + lane]
+        impact = at[VELOCITY + axis * LANES + lane]
+        speed = (position - at[START + axis * LANES + lane]) * inverse_h
         rebound = -restitution * impact if abs(impact) > rest_speed else zero
         at_lower = position <= lower
         at_upper = position >= upper
         speed = max(rebound, zero) if at_lower else speed
         speed = min(rebound, zero) if at_upper else speed
-        row[VELOCITY + axis * LANES + lane] = speed
+        at[VELOCITY + axis * LANES + lane] = speed

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compiling import kernel
+from ..compiling import kernel, row
 from .chain import project_chain_velocities, project_chains, project_chains_from_start
 from .collision import collide_with_self, find_pairs
 from .contact import collide_with_walls, read_velocities
@@ -58,29 +58,30 @@ def _world(tile, lane, num_worlds):
 @kernel
 def _load(x, v, tile, work):
     for particle in range(x.shape[1]):
-        row = work[particle]
+        at = row(work, particle)
         for lane in range(LANES):
             world = _world(tile, lane, x.shape[0])
             for k in range(DIM):
-                row[POSITION + k * LANES + lane] = x[world, particle, k]
-                row[VELOCITY + k * LANES + lane] = v[world, particle, k]
+                at[POSITION + k * LANES + lane] = x[world, particle, k]
+                at[VELOCITY + k * LANES + lane] = v[world, particle, k]
 
 
 @kernel
 def _store(x, v, tile, work):
     for particle in range(x.shape[1]):
-        row = work[particle]
+        at = row(work, particle)
         for lane in range(min(LANES, x.shape[0] - tile * LANES)):
             for k in range(DIM):
-                x[tile * LANES + lane, particle, k] = row[POSITION + k * LANES + lane]
-                v[tile * LANES + lane, particle, k] = row[VELOCITY + k * LANES + lane]
+                x[tile * LANES + lane, particle, k] = at[POSITION + k * LANES + lane]
+                v[tile * LANES + lane, particle, k] = at[VELOCITY + k * LANES + lane]
 
 
 @kernel
 def _aim_pins(x, targets, tile, work, model, timing):
     """Give the pins the velocity that brings them to their targets within the control step."""
-    for index in range(model.pins.shape[0]):
-        pin = model.pins[index]
+    pins = model.pins
+    for index in range(pins.shape[0]):
+        pin = pins[index]
         for lane in range(LANES):
             world = _world(tile, lane, x.shape[0])
             for k in range(DIM):
@@ -91,8 +92,9 @@ def _aim_pins(x, targets, tile, work, model, timing):
 @kernel
 def _move_pins(x, targets, tile, work, model, remaining):
     """Interpolate the pins linearly: a jump would bring in energy that grows with substeps^2."""
-    for index in range(model.pins.shape[0]):
-        pin = model.pins[index]
+    pins = model.pins
+    for index in range(pins.shape[0]):
+        pin = pins[index]
         for lane in range(LANES):
             world = _world(tile, lane, x.shape[0])
             for k in range(DIM):
@@ -106,19 +108,20 @@ def _predict(work, model, timing, second_order):
     """Steps 1-3 of the seed: damp, add the acceleration, move. Second order kicks by half here."""
     half = work.dtype.type(0.5)
     h, decay = timing[1], timing[4]
-    for particle in range(model.inverse_mass.shape[0]):
-        row = work[particle]
-        free = model.inverse_mass[particle] > 0
+    inverse_mass, gravity = model.inverse_mass, model.gravity
+    for particle in range(inverse_mass.shape[0]):
+        at = row(work, particle)
+        free = inverse_mass[particle] > 0
         for k in range(DIM):
-            kick = model.gravity[k] * h
+            kick = gravity[k] * h
             if second_order is not None:
                 kick = kick * half
             for lane in range(k * LANES, (k + 1) * LANES):
-                row[START + lane] = row[POSITION + lane]
+                at[START + lane] = at[POSITION + lane]
                 if free:
                     # damping before the kick: it must not lighten what hangs at rest
-                    row[VELOCITY + lane] = row[VELOCITY + lane] * decay + kick
-                    row[POSITION + lane] += row[VELOCITY + lane] * h
+                    at[VELOCITY + lane] = at[VELOCITY + lane] * decay + kick
+                    at[POSITION + lane] += at[VELOCITY + lane] * h
 
 
 @kernel
@@ -149,12 +152,13 @@ def _finish(work, model, timing, second_order):
         read_velocities(work, model, timing[2])
     if second_order is not None:
         half = work.dtype.type(0.5)
-        for particle in range(model.inverse_mass.shape[0]):
-            if model.inverse_mass[particle] > 0:
-                row = work[particle]
+        inverse_mass, gravity = model.inverse_mass, model.gravity
+        for particle in range(inverse_mass.shape[0]):
+            if inverse_mass[particle] > 0:
+                at = row(work, particle)
                 for k in range(DIM):
-                    kick = model.gravity[k] * timing[1] * half
+                    kick = gravity[k] * timing[1] * half
                     for lane in range(k * LANES, (k + 1) * LANES):
-                        row[VELOCITY + lane] += kick
+                        at[VELOCITY + lane] += kick
         project_distance_velocities(work, model)
         project_chain_velocities(work, model)

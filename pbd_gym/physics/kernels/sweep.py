@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compiling import kernel
+from ..compiling import kernel, row
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 
 
@@ -12,24 +12,27 @@ def project_distances(work, model, inverse_h2, iteration):
 
     A compliant one is projected in the first iteration only: a second would make it stiffer.
     """
-    for index in range(model.distance_rest.shape[0]):
-        i, j = model.distance_pairs[index, 0], model.distance_pairs[index, 1]
-        compliance = model.distance_compliance[index]
-        if iteration == 0 or compliance == 0:
+    inverse_mass, pairs, rest = model.inverse_mass, model.distance_pairs, model.distance_rest
+    compliance, stiffness = model.distance_compliance, model.distance_stiffness
+    for index in range(rest.shape[0]):
+        i, j = pairs[index, 0], pairs[index, 1]
+        alpha = compliance[index]
+        if iteration == 0 or alpha == 0:
             _distance(
-                work[i],
-                work[j],
-                model.inverse_mass[i],
-                model.inverse_mass[j],
-                model.distance_rest[index],
-                compliance * inverse_h2,
-                model.distance_stiffness[index],
+                row(work, i),
+                row(work, j),
+                inverse_mass[i],
+                inverse_mass[j],
+                rest[index],
+                alpha * inverse_h2,
+                stiffness[index],
             )
 
 
 @kernel
 def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness):
-    one, zero = a.dtype.type(1), a.dtype.type(0)
+    real = type(mass_a)
+    one, zero = real(1), real(0)
     total = mass_a + mass_b + alpha
     share = stiffness / total if total > zero else zero
     for lane in range(LANES):
@@ -49,25 +52,28 @@ def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness):
 @kernel
 def project_distances_from_start(work, model, inverse_h2, iteration):
     """Project every distance along its direction at the start of the substep (SHAKE)."""
-    for index in range(model.distance_rest.shape[0]):
-        i, j = model.distance_pairs[index, 0], model.distance_pairs[index, 1]
-        compliance = model.distance_compliance[index]
-        if iteration == 0 or compliance == 0:
+    inverse_mass, pairs, rest = model.inverse_mass, model.distance_pairs, model.distance_rest
+    compliance, stiffness = model.distance_compliance, model.distance_stiffness
+    for index in range(rest.shape[0]):
+        i, j = pairs[index, 0], pairs[index, 1]
+        alpha = compliance[index]
+        if iteration == 0 or alpha == 0:
             _distance_from_start(
-                work[i],
-                work[j],
-                model.inverse_mass[i],
-                model.inverse_mass[j],
-                model.distance_rest[index],
-                compliance * inverse_h2,
-                model.distance_stiffness[index],
+                row(work, i),
+                row(work, j),
+                inverse_mass[i],
+                inverse_mass[j],
+                rest[index],
+                alpha * inverse_h2,
+                stiffness[index],
             )
 
 
 @kernel
 def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
     """One Newton step of (|x_a - x_b|^2 - rest^2) / (2 rest) = 0 along the start direction."""
-    one, zero, half = a.dtype.type(1), a.dtype.type(0), a.dtype.type(0.5)
+    real = type(mass_a)
+    one, zero, half = real(1), real(0), real(0.5)
     inverse = one / rest
     for lane in range(LANES):
         square, aligned = zero, zero
@@ -91,15 +97,18 @@ def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
 @kernel
 def project_distance_velocities(work, model):
     """Remove the velocity along rigid distances (the second half of RATTLE)."""
-    for index in range(model.distance_rest.shape[0]):
-        i, j = model.distance_pairs[index, 0], model.distance_pairs[index, 1]
-        if model.distance_compliance[index] == 0:
-            _distance_velocity(work[i], work[j], model.inverse_mass[i], model.inverse_mass[j])
+    inverse_mass, pairs = model.inverse_mass, model.distance_pairs
+    compliance = model.distance_compliance
+    for index in range(pairs.shape[0]):
+        i, j = pairs[index, 0], pairs[index, 1]
+        if compliance[index] == 0:
+            _distance_velocity(row(work, i), row(work, j), inverse_mass[i], inverse_mass[j])
 
 
 @kernel
 def _distance_velocity(a, b, mass_a, mass_b):
-    one, zero = a.dtype.type(1), a.dtype.type(0)
+    real = type(mass_a)
+    one, zero = real(1), real(0)
     total = mass_a + mass_b
     share = one / total if total > zero else zero
     for lane in range(LANES):
@@ -118,22 +127,25 @@ def _distance_velocity(a, b, mass_a, mass_b):
 @kernel
 def project_bends(work, model, inverse_h2):
     """Draw x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta."""
-    for index in range(model.bend_compliance.shape[0]):
-        i, j, k = model.bend_triples[index, 0], model.bend_triples[index, 1], model.bend_triples[index, 2]
+    inverse_mass, triples = model.inverse_mass, model.bend_triples
+    bend_compliance = model.bend_compliance
+    for index in range(bend_compliance.shape[0]):
+        i, j, k = triples[index, 0], triples[index, 1], triples[index, 2]
         _bend(
-            work[i],
-            work[j],
-            work[k],
-            model.inverse_mass[i],
-            model.inverse_mass[j],
-            model.inverse_mass[k],
-            model.bend_compliance[index] * inverse_h2,
+            row(work, i),
+            row(work, j),
+            row(work, k),
+            inverse_mass[i],
+            inverse_mass[j],
+            inverse_mass[k],
+            bend_compliance[index] * inverse_h2,
         )
 
 
 @kernel
 def _bend(a, b, c, mass_a, mass_b, mass_c, alpha):
-    one, two, four, zero = a.dtype.type(1), a.dtype.type(2), a.dtype.type(4), a.dtype.type(0)
+    real = type(mass_a)
+    one, two, four, zero = real(1), real(2), real(4), real(0)
     total = mass_a + four * mass_b + mass_c + alpha
     share = one / total if total > zero else zero
     for lane in range(LANES):
