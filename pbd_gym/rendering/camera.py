@@ -19,7 +19,7 @@ class Camera(Protocol):
 
         Returns:
             Pixels (M, 2), x to the right and y down, and the depth of each point (M,) [m]. What
-            cannot be seen, because it is not finite or behind the camera, has NaN pixels.
+            cannot be seen, because it is not finite or not in front of the camera, has NaN pixels.
         """
         ...
 
@@ -82,12 +82,14 @@ class PerspectiveCamera:
         axes: Unit vectors to the right, up and forward, (3, 3), one in each row.
         focal_length: Pixels per unit of slope.
         middle: Pixel in the line of sight, (2,).
+        nearest: Depth up to which points are too near to be drawn [m].
     """
 
     eye: np.ndarray
     axes: np.ndarray
     focal_length: float
     middle: np.ndarray
+    nearest: float
 
     @classmethod
     def framing(
@@ -119,23 +121,24 @@ class PerspectiveCamera:
         right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         axes = np.stack([right, np.cross(out, right), -out])
         # Far enough for a calm perspective; how large the box appears is the focal length's task.
-        eye = (lower + upper) / 2.0 + out * 2.2 * float(np.linalg.norm(upper - lower))
+        distance = 2.2 * float(np.linalg.norm(upper - lower))
+        eye = (lower + upper) / 2.0 + out * distance
         corners = np.array([[(lower, upper)[b >> k & 1][k] for k in range(3)] for b in range(8)])
         local = (corners - eye) @ axes.T
         slopes = local[:, :2] / local[:, 2:]
         low, high = slopes.min(axis=0), slopes.max(axis=0)
         focal = float(np.min(np.array(size) * (1.0 - 2.0 * margin) / (high - low)))
         middle = np.array(size) / 2.0 - (low + high) / 2.0 * (focal, -focal)
-        return cls(eye, axes, focal, middle)
+        return cls(eye, axes, focal, middle, 0.2 * distance)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Project points (M, 3) [m] on pixels (M, 2) and the depth along the line of sight [m]."""
         local = (points - self.eye) @ self.axes.T
         depth = local[:, 2]
-        in_front = np.where(depth > 1e-6, depth, np.nan)
+        in_front = np.where(depth > self.nearest, depth, np.nan)
         slopes = local[:, :2] / in_front[:, None]
         return self.middle + slopes * (self.focal_length, -self.focal_length), depth
 
     def scale(self, depth: float) -> float:
         """Return the pixels per metre at a depth [m]."""
-        return self.focal_length / max(depth, 1e-6)
+        return self.focal_length / max(depth, self.nearest)

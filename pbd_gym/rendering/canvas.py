@@ -196,10 +196,10 @@ class Canvas:
         for polygon, alpha in zip(corners, alphas, strict=True):
             self._pygame.draw.polygon(layer, (*colour, alpha), polygon)
         box = self.around(polygons.reshape(-1, 2), 3.0 * blurred)
+        if not (box.width and box.height):
+            return
         left, top = box.left // blurred, box.top // blurred
         width, height = -(-box.right // blurred) - left, -(-box.bottom // blurred) - top
-        if not (width and height):
-            return
         part = layer.subsurface([2 * v for v in (left, top, width, height)])
         coarse = smoothscale(part, (width, height))
         alpha = self._pygame.surfarray.pixels_alpha(coarse)

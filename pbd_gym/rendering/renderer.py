@@ -91,7 +91,7 @@ class Renderer:
             raise ValueError(f"{name} has shape {array.shape}; the model needs {shape}")
         # Pixel coordinates of particles that flew off must still fit pygame's integers.
         lower, upper = self._view
-        reach = 20.0 * float(np.max(upper - lower))
+        reach = 10.0 * float(np.max(upper - lower))
         near = (array > lower - reach) & (array < upper + reach)
         array[~near.all(axis=1)] = np.nan
         return array
