@@ -145,7 +145,9 @@ class Canvas:
         self.touch(self._pygame.draw.rect(self.surface, colour, box, border_radius=radius))
 
     def text(self, words: str, centre: tuple[float, float], height: float, colour: Colour) -> None:
-        """Write a line of text around a point."""
+        """Write a line of text around a point, unless it would be too small to read."""
+        if height < 6.0 * self._supersampling:
+            return
         self._pygame.font.init()
         font = self._pygame.font.Font(None, round(height))
         label = font.render(words, True, colour)
