@@ -15,8 +15,8 @@ from pbd_gym.physics.model import Model
 from pbd_gym.physics.parameters import Parameters
 
 # One world runs in scalar code. Below this number of worlds a tile of lanes would be mostly empty.
-_FEWEST_FOR_LANES = 6
-_BATCH_LANES = 16
+_FEWEST_FOR_LANES = 8
+_BATCH_LANES = 32
 # Below this many particles in all worlds, waking a second thread costs more than it brings.
 _FEWEST_PARTICLES_FOR_THREADS = 4096
 # Candidate pairs of self-collision that a world can hold, per particle.

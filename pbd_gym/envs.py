@@ -1,0 +1,426 @@
+"""The two Gymnasium faces of a task: one world, or n. The one place where episodes begin and end."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from pbd_gym.physics import Snapshot
+from pbd_gym.rendering import Renderer, Window
+from pbd_gym.tasks import Batch, Task
+
+_RENDER_MODES = ["rgb_array", "human"]
+
+
+@dataclasses.dataclass(frozen=True)
+class EpisodeState:
+    """All that the continuation of n episodes depends on; made by `get_state`.
+
+    Attributes:
+        worlds: Positions and velocities.
+        variables: What the task remembers of each episode, (W, ...) arrays by name.
+        generators: State of each world's random generator.
+        elapsed: Steps since each episode began, (W,).
+        ended: Which episodes have ended and were not begun anew, (W,).
+        begun: Which worlds were reset at least once, (W,).
+    """
+
+    worlds: Snapshot
+    variables: dict[str, np.ndarray]
+    generators: list[dict[str, Any]]
+    elapsed: np.ndarray
+    ended: np.ndarray
+    begun: np.ndarray
+
+
+def make_task(task: str | type[Task], arguments: dict[str, Any]) -> Task:
+    """Return the task of a class or of its place, "module:Class", configured by keywords.
+
+    Raises:
+        TypeError: For a keyword that the task does not know, or a value of another kind.
+        ValueError: For a value out of range, or a place that holds no task.
+    """
+    if isinstance(task, str):
+        module, _, name = task.partition(":")
+        task = getattr(importlib.import_module(module), name, None)  # type: ignore[assignment]
+    if not (isinstance(task, type) and issubclass(task, Task)):
+        raise ValueError(f"task is {task!r}; expected a Task class or its place 'module:Class'")
+    known = [spec.name for spec in dataclasses.fields(task)]
+    for name in arguments:
+        if name not in known:
+            raise TypeError(f"{task.__name__} has no keyword {name!r}; allowed: {', '.join(known)}")
+    return task(**arguments)
+
+
+class _Pictures:
+    """Draws worlds of a batch, in a window if asked; makes renderer and window when first used."""
+
+    def __init__(self, task: Task, render_mode: str | None, render_size: tuple[int, int]) -> None:
+        if render_mode is not None and render_mode not in _RENDER_MODES:
+            raise ValueError(f"render_mode is {render_mode!r}; allowed: None, {_RENDER_MODES}")
+        self.task, self.size = task, render_size
+        self.renderer: Renderer | None = None
+        self.window: Window | None = None
+
+    def draw(self, batch: Batch, world: int) -> np.ndarray:
+        """Return a frame of one world, (height, width, 3) uint8."""
+        if self.renderer is None:
+            self.renderer = Renderer(self.task.model, self.task.view, size=self.size)
+        goal = self.task.goal(batch.variables, world) if batch.variables else None
+        return self.renderer.draw(batch.world.x[world], goal, self.task.goal_radius)
+
+    def show(self, frame: np.ndarray) -> None:
+        """Show a frame in the window, in real time."""
+        if self.window is None:
+            self.window = Window(self.size, self.task.control_rate)
+        self.window.show(frame)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self.window is not None:
+            self.window.close()
+        self.window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # surfaces and windows cannot be pickled; they are made again when needed
+        return {**self.__dict__, "renderer": None, "window": None}
+
+
+class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """One world of a task. The time limit is Gymnasium's `TimeLimit` wrapper, as for any env.
+
+    Args:
+        task: Task class, or its place "module:Class".
+        render_mode: None, "rgb_array" or "human".
+        render_size: Width and height of a frame [pixels].
+        **arguments: The task's configuration, see its class.
+
+    Raises:
+        TypeError: For an unknown keyword.
+        ValueError: For a value out of range.
+    """
+
+    metadata = {"render_modes": list(_RENDER_MODES), "render_fps": 30}  # noqa: RUF012
+
+    def __init__(
+        self,
+        task: str | type[Task],
+        *,
+        render_mode: str | None = None,
+        render_size: tuple[int, int] = (512, 512),
+        **arguments: Any,
+    ) -> None:
+        self.task = make_task(task, arguments)
+        self._pictures = _Pictures(self.task, render_mode, render_size)
+        self.render_mode = render_mode
+        self.metadata = {**type(self).metadata, "render_fps": _fps(self.task)}
+        self.metadata["render_modes"] = list(_RENDER_MODES)
+        self.action_space = self.task.action_space
+        self.observation_space = self.task.observation_space
+        self._batch = Batch(self.task, 1, num_threads=1)
+        self._begun = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode; options fix quantities that are drawn otherwise (see the task).
+
+        Raises:
+            ValueError: For an unknown option or one out of range.
+        """
+        super().reset(seed=seed)
+        self._batch.reset(np.zeros(1, dtype=np.int64), [self.np_random], options or {})
+        self._begun = True
+        if self.render_mode == "human":
+            self.render()
+        return self._batch.observe()[0], {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Advance the world by one control step.
+
+        Raises:
+            RuntimeError: Before the first `reset`.
+            TypeError, ValueError: For an action that is no vector of finite numbers of the right
+                size. Nothing has moved then.
+        """
+        if not self._begun:
+            raise RuntimeError("step was called before reset: call reset() first")
+        outcome = self._batch.step(self._batch.check_actions(np.asarray(action)[None]))
+        if self.render_mode == "human":
+            self.render()
+        info = {name: values[0].item() for name, values in outcome.info.items()}
+        observation = self._batch.observe()[0]
+        return observation, float(outcome.reward[0]), bool(outcome.terminated[0]), False, info
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """Return a frame (height, width, 3) uint8; in human mode show it and return None."""
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render was called without a render mode; make the environment with "
+                'render_mode="rgb_array" or "human"'
+            )
+            return None
+        frame = self._pictures.draw(self._batch, 0)
+        if self.render_mode == "rgb_array":
+            return frame
+        self._pictures.show(frame)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._pictures.close()
+
+    def get_state(self) -> EpisodeState:
+        """Return all that the episode's continuation depends on, the random generator included.
+
+        The counter of a `TimeLimit` wrapper is its own and not part of it.
+        """
+        worlds, variables = self._batch.get_state()
+        begun = np.array([self._begun])
+        generators = [self.np_random.bit_generator.state]
+        counters = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=bool)
+        return EpisodeState(worlds, variables, generators, *counters, begun)
+
+    def set_state(self, state: EpisodeState) -> None:
+        """Continue from a state of `get_state`, to the last bit.
+
+        Raises:
+            ValueError: If the state is of another model or number of worlds.
+        """
+        self._batch.set_state((state.worlds, state.variables))
+        self.np_random.bit_generator.state = state.generators[0]
+        self._begun = bool(state.begun[0])
+
+
+class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+    """n worlds of a task in one batch, with time limit and autoreset.
+
+    Equal to a `SyncVectorEnv` of n single environments to the last bit, in all three autoreset
+    modes: world i draws from a generator of its own, seeded as `SyncVectorEnv` seeds env i.
+
+    Args:
+        num_envs: Number of worlds.
+        task: Task class, or its place "module:Class".
+        max_episode_steps: Steps after which an episode is truncated; None for no limit.
+        autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, as an `AutoresetMode` or its name.
+        render_mode: None or "rgb_array".
+        render_size: Width and height of a frame [pixels].
+        num_threads: Threads that share the worlds; chosen by the size of the batch where None.
+        **arguments: The task's configuration, see its class.
+
+    Raises:
+        TypeError: For an unknown keyword.
+        ValueError: For a value out of range.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(
+        self,
+        num_envs: int,
+        task: str | type[Task],
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        render_size: tuple[int, int] = (512, 512),
+        num_threads: int | None = None,
+        **arguments: Any,
+    ) -> None:
+        if render_mode == "human":
+            raise ValueError("render_mode is 'human'; a vector environment draws 'rgb_array' only")
+        if max_episode_steps is not None and max_episode_steps < 1:
+            raise ValueError(f"max_episode_steps is {max_episode_steps}; expected at least 1")
+        self.task = make_task(task, arguments)
+        self._pictures = _Pictures(self.task, render_mode, render_size)
+        self.render_mode = render_mode
+        self.num_envs = num_envs
+        self.max_episode_steps = max_episode_steps
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = {
+            "render_modes": ["rgb_array"],
+            "render_fps": _fps(self.task),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self._batch = Batch(self.task, num_envs, num_threads)
+        self.single_action_space = self.task.action_space
+        self.single_observation_space = self.task.observation_space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
+        self._elapsed = np.zeros(num_envs, dtype=np.int64)
+        self._ended = np.zeros(num_envs, dtype=bool)
+        self._begun = np.zeros(num_envs, dtype=bool)
+
+    def reset(
+        self,
+        *,
+        seed: int | list[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin episodes in all worlds, or in those of `options["reset_mask"]`.
+
+        Args:
+            seed: World i is seeded with seed + i, or with the i-th of a list.
+            options: Quantities to fix (see the task), for all worlds or one row per world, and
+                `reset_mask`, a bool array (num_envs,).
+
+        Raises:
+            TypeError, ValueError: For a wrong seed, mask or option. Nothing changes then.
+        """
+        fixed = dict(options or {})
+        mask = self._check_mask(fixed.pop("reset_mask", None))
+        generators = self._seeded(seed, mask)
+        self._begin(np.flatnonzero(mask), generators, fixed)
+        self._generators = generators
+        return self._batch.observe(), {}
+
+    def _begin(
+        self, worlds: np.ndarray, generators: list[np.random.Generator], fixed: dict[str, Any]
+    ) -> None:
+        self._batch.reset(worlds, generators, fixed)
+        self._elapsed[worlds] = 0
+        self._ended[worlds] = False
+        self._begun[worlds] = True
+
+    def _check_mask(self, mask: Any) -> np.ndarray:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=bool)
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+            raise TypeError(f"reset_mask is {mask!r}; expected a numpy array of dtype bool")
+        if mask.shape != (self.num_envs,) or not mask.any():
+            raise ValueError(
+                f"reset_mask has shape {mask.shape} and {mask.sum()} true entries; expected shape "
+                f"({self.num_envs},) and at least one"
+            )
+        return mask
+
+    def _seeded(
+        self, seed: int | list[int | None] | None, mask: np.ndarray
+    ) -> list[np.random.Generator]:
+        """Return the generators of all worlds, anew where a masked world is given a seed."""
+        if seed is None:
+            return self._generators
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"{len(seeds)} seeds were given for {self.num_envs} worlds")
+        return [
+            seeding.np_random(new)[0] if new is not None and masked else old
+            for new, old, masked in zip(seeds, self._generators, mask, strict=True)
+        ]
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Advance every world by one control step; begin ended episodes anew by autoreset mode.
+
+        Raises:
+            RuntimeError: Before the first `reset`, or with autoreset DISABLED while an ended
+                episode was not reset.
+            TypeError, ValueError: For actions that are no finite numbers of the right shape.
+                Nothing has moved then.
+        """
+        if not self._begun.all():
+            raise RuntimeError("step was called before reset: call reset() first")
+        checked = self._batch.check_actions(actions)
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+            raise RuntimeError(
+                f"the episode of world {np.flatnonzero(self._ended)[0]} has ended and autoreset is "
+                "disabled: call reset(options={'reset_mask': ...}) first"
+            )
+        fresh = self._ended.copy()
+        outcome = self._batch.step(checked)
+        if fresh.any():  # NEXT_STEP: this step only begins those episodes
+            self._begin(np.flatnonzero(fresh), self._generators, {})
+        self._elapsed += ~fresh
+        terminated = outcome.terminated & ~fresh
+        limit = self.max_episode_steps
+        truncated = np.zeros(self.num_envs, dtype=bool) if limit is None else self._elapsed >= limit
+        self._ended = terminated | truncated
+        reward = np.where(fresh, 0.0, outcome.reward)
+        observation = self._batch.observe()
+        infos = _infos(outcome.info, ~fresh)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+            infos = self._begin_ended(observation, outcome.info)
+            observation = self._batch.observe()
+        return observation, reward, terminated, truncated, infos
+
+    def _begin_ended(
+        self, observation: np.ndarray, info: dict[str, np.ndarray]
+    ) -> dict[str, Any]:
+        """Begin the ended episodes anew; return infos that hold how they ended."""
+        ended = self._ended.copy()
+        infos = _infos(info, ~ended)
+        last = np.full(self.num_envs, None, dtype=object)
+        for world in np.flatnonzero(ended):
+            last[world] = observation[world].copy()
+        infos["final_obs"], infos["_final_obs"] = last, ended.copy()
+        infos["final_info"], infos["_final_info"] = _infos(info, ended), ended.copy()
+        self._begin(np.flatnonzero(ended), self._generators, {})
+        return infos
+
+    def render(self) -> tuple[np.ndarray, ...] | None:  # type: ignore[override]
+        """Return one frame per world, (height, width, 3) uint8 each; None without a render mode."""
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                'render was called without a render mode; pass render_mode="rgb_array"'
+            )
+            return None
+        return tuple(self._pictures.draw(self._batch, world) for world in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Release what draws."""
+        self._pictures.close()
+
+    def get_state(self) -> EpisodeState:
+        """Return all that the continuation of every world depends on, random generators included."""
+        worlds, variables = self._batch.get_state()
+        generators = [generator.bit_generator.state for generator in self._generators]
+        counters = self._elapsed.copy(), self._ended.copy(), self._begun.copy()
+        return EpisodeState(worlds, variables, generators, *counters)
+
+    def set_state(self, state: EpisodeState) -> None:
+        """Continue from a state of `get_state`, to the last bit.
+
+        Raises:
+            ValueError: If the state is of another model or number of worlds. Nothing changes then.
+        """
+        self._batch.set_state((state.worlds, state.variables))
+        for generator, saved in zip(self._generators, state.generators, strict=True):
+            generator.bit_generator.state = saved
+        self._elapsed = state.elapsed.copy()
+        self._ended = state.ended.copy()
+        self._begun = state.begun.copy()
+
+
+def _infos(info: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
+    """Return Gymnasium's vector format: each array, 0 where masked out, and its mask."""
+    if not mask.any():
+        return {}
+    infos: dict[str, Any] = {}
+    for name, values in info.items():
+        wide = values.astype(np.float64) if values.dtype == np.float32 else values
+        infos[name] = wide if mask.all() else np.where(mask, wide, wide.dtype.type(0))
+        infos[f"_{name}"] = mask.copy()
+    return infos
+
+
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Return the mode of a name."""
+    if isinstance(mode, AutoresetMode):
+        return mode
+    if mode in AutoresetMode.__members__:
+        return AutoresetMode[mode]
+    raise ValueError(f"autoreset_mode is {mode!r}; allowed: {', '.join(AutoresetMode.__members__)}")
+
+
+def _fps(task: Task) -> int:
+    """Return the frames per second at which a video plays in real time."""
+    return max(1, round(task.control_rate))

@@ -1,0 +1,6 @@
+"""Tasks: what is controlled, observed and rewarded. Each is written once, for n worlds."""
+
+from pbd_gym.tasks.base import Judgement, Start, Task, draw, number
+from pbd_gym.tasks.batch import Batch
+
+__all__ = ["Batch", "Judgement", "Start", "Task", "draw", "number"]

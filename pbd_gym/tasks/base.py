@@ -1,0 +1,273 @@
+"""What a task is: actions to pin targets, observation, reward, success, start; for n worlds at once."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+
+from pbd_gym.physics import Model
+
+Variables = dict[str, np.ndarray]
+# Observations are scaled to about [-1, 1] and clipped here, so that their bounds are finite.
+_OBSERVATION_LIMIT = 10.0
+
+
+def number(default: float, low: float, high: float, unit: str = "") -> Any:
+    """Declare a number of a task's configuration, its range (both ends allowed) and its unit."""
+    return dataclasses.field(default=default, metadata={"low": low, "high": high, "unit": unit})
+
+
+def choice(default: str, *allowed: str) -> Any:
+    """Declare a word of a task's configuration and the words that are allowed."""
+    return dataclasses.field(default=default, metadata={"allowed": allowed})
+
+
+@dataclasses.dataclass(frozen=True)
+class Draw:
+    """A quantity drawn uniformly at every reset; an option of `reset` can fix it instead.
+
+    Attributes:
+        low: (k,) least value drawn.
+        high: (k,) greatest value drawn.
+        least: (k,) least value an option may have.
+        greatest: (k,) greatest value an option may have.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    least: np.ndarray
+    greatest: np.ndarray
+
+
+def draw(low: Any, high: Any, least: Any = None, greatest: Any = None) -> Draw:
+    """Declare a drawn quantity; an option may have the same range where no other is given."""
+    ends = [low, high, low if least is None else least, high if greatest is None else greatest]
+    return Draw(*(np.atleast_1d(np.asarray(end, dtype=np.float64)) for end in ends))
+
+
+class Start(NamedTuple):
+    """Where n worlds begin: positions and velocities (n, N, dim), and what the task remembers."""
+
+    x: np.ndarray
+    v: np.ndarray
+    variables: Variables
+
+
+class Judgement(NamedTuple):
+    """How n worlds stand after a step, each (n,).
+
+    Attributes:
+        reward: In [0, 1].
+        reached: Whether the goal is met at this moment.
+        performance: The task's measure, greater is better.
+        terms: Parts of the reward, for `info`.
+    """
+
+    reward: np.ndarray
+    reached: np.ndarray
+    performance: np.ndarray
+    terms: dict[str, np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Task:
+    """A task for n worlds. Its fields are its configuration, with units; subclasses add theirs.
+
+    A subclass defines the methods that raise NotImplementedError here, as class constants
+    `hold_steps` (number of steps in a row for which the goal must be met), `best_performance`, and
+    `action_axes` (the axes along which an action moves each pin).
+
+    Raises:
+        TypeError: For a keyword that does not exist or a value of another kind.
+        ValueError: For a value out of range.
+    """
+
+    control_rate: float = number(30.0, 1.0, 1000.0, "Hz")
+    substeps: int = number(10, 1, 1000)  # type: ignore[assignment]
+    max_speed: float = number(2.0, 1e-3, 100.0, "m/s")
+    max_acceleration: float = number(20.0, 1e-3, 1000.0, "m/s2")
+    gravity: float = number(9.81, 0.0, 100.0, "m/s2")
+    damping: float = number(0.5, 0.0, 100.0, "1/s")
+    observation: str = choice("particles", "particles", "keypoints")
+
+    hold_steps: ClassVar[int] = 1
+    best_performance: ClassVar[float] = 0.0
+    action_axes: ClassVar[tuple[int, ...]] = (0, 1)
+    # beyond this distance from the origin a world has diverged [m]
+    sanity_bound: ClassVar[float] = 100.0
+
+    def __post_init__(self) -> None:
+        for spec in dataclasses.fields(self):
+            _check_field(spec, getattr(self, spec.name))
+
+    @cached_property
+    def model(self) -> Model:
+        """The model of one world."""
+        return self.build()
+
+    @cached_property
+    def draws(self) -> dict[str, Draw]:
+        """What is drawn at a reset, by name."""
+        return self.declare_draws()
+
+    @cached_property
+    def action_space(self) -> spaces.Box:
+        """Desired velocities of the pins in units of `max_speed`."""
+        size = len(self.action_axes) * len(self.model.pins)
+        return spaces.Box(-1.0, 1.0, (size,), np.float32)
+
+    @cached_property
+    def observation_space(self) -> spaces.Box:
+        """What `observe` returns for one world."""
+        quantities = {name: spec.low[None] for name, spec in self.draws.items()}
+        start = self.start(quantities)
+        size = self.observe(start.x, start.v, start.variables).shape[1]
+        return spaces.Box(-_OBSERVATION_LIMIT, _OBSERVATION_LIMIT, (size,), np.float32)
+
+    @property
+    def view(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners of the box that a picture shows, (dim,) each [m]."""
+        raise NotImplementedError
+
+    def build(self) -> Model:
+        """Build the model of one world."""
+        raise NotImplementedError
+
+    def declare_draws(self) -> dict[str, Draw]:
+        """Declare what is drawn at a reset."""
+        raise NotImplementedError
+
+    def start(self, quantities: dict[str, np.ndarray]) -> Start:
+        """Return where worlds begin, given the drawn quantities, each (n, k) in float64."""
+        raise NotImplementedError
+
+    def workspace(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners of the box in which the pins stay, (dim,) each [m]."""
+        raise NotImplementedError
+
+    def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
+        """Return observations (n, size) in the state's dtype, before clipping."""
+        raise NotImplementedError
+
+    def judge(
+        self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
+    ) -> Judgement:
+        """Judge worlds by their state and the action (n, size) that led to it."""
+        raise NotImplementedError
+
+    def scripted(self, observation: np.ndarray) -> np.ndarray:
+        """Return the actions (n, size) of a hand-written policy for observations (n, size)."""
+        raise NotImplementedError
+
+    def goal(self, variables: Variables, world: int) -> np.ndarray | None:
+        """Return where particles should be, (N, dim) [m], NaN where anything goes; None for no goal."""
+        return None
+
+    @property
+    def goal_radius(self) -> float:
+        """Tolerance around a goal [m], for the picture."""
+        return 0.0
+
+    def span(self) -> float:
+        """Return how far apart two pins may be [m]."""
+        return np.inf
+
+    def pin_targets(
+        self, x: np.ndarray, v: np.ndarray, action: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Turn actions into pin targets at the end of the control step.
+
+        The pins' velocities follow the desired ones with at most `max_acceleration` along each
+        axis. They brake in time to stop at the edges of the workspace: from u the way to a stop is
+        u dt + u^2/(2 a), which gives the greatest speed at a distance.
+
+        Args:
+            x: Positions (n, N, dim) [m].
+            v: Velocities (n, N, dim) [m/s].
+            action: (n, size) in [-1, 1].
+
+        Returns:
+            Targets (n, P, dim) [m], and by how much the pins' velocities fall short of the desired
+            ones, (n,) in units of `max_speed`.
+        """
+        real = x.dtype.type
+        dt, acceleration = real(1.0 / self.control_rate), real(self.max_acceleration)
+        pins = self.model.pins
+        position, velocity = x[:, pins], v[:, pins]
+        desired = np.zeros_like(position)
+        desired[:, :, list(self.action_axes)] = real(self.max_speed) * action.reshape(
+            len(x), len(pins), -1
+        )
+        change = acceleration * dt
+        reached = velocity + np.clip(desired - velocity, -change, change)
+        lower, upper = (corner.astype(x.dtype) for corner in self.workspace())
+        reached = np.minimum(reached, _braking_speed(upper - position, acceleration, dt))
+        reached = np.maximum(reached, -_braking_speed(position - lower, acceleration, dt))
+        targets = np.clip(position + reached * dt, lower, upper)
+        if len(pins) == 2:
+            targets = _keep_together(targets, real(self.span()))
+        short = np.abs(desired - (targets - position) / dt).max(axis=(1, 2)) / real(self.max_speed)
+        return targets, short
+
+
+def _braking_speed(distance: np.ndarray, acceleration: Any, dt: Any) -> np.ndarray:
+    """Return the greatest speed from which a pin can stop within a distance [m/s]."""
+    way = np.maximum(distance, 0)
+    return acceleration * (np.sqrt(dt * dt + (way + way) / acceleration) - dt)
+
+
+def _keep_together(targets: np.ndarray, span: Any) -> np.ndarray:
+    """Draw two pins together to the distance that their body can span; their middle stays."""
+    apart = targets[:, 1] - targets[:, 0]
+    square = apart[:, 0] * apart[:, 0]
+    for axis in range(1, apart.shape[1]):
+        square = square + apart[:, axis] * apart[:, axis]
+    distance = np.sqrt(square)
+    too_far = distance > span
+    if not too_far.any():
+        return targets
+    share = np.where(too_far, span / np.maximum(distance, span), 1).astype(targets.dtype)
+    half = targets.dtype.type(0.5)
+    middle = (targets[:, 0] + targets[:, 1]) * half
+    reach = apart * (share * half)[:, None]
+    drawn = np.stack([middle - reach, middle + reach], axis=1)
+    return np.where(too_far[:, None, None], drawn, targets)
+
+
+def _check_field(spec: Any, value: Any) -> None:
+    """Refuse a configuration value of another kind or out of the range declared for it."""
+    if "allowed" in spec.metadata:
+        if value not in spec.metadata["allowed"]:
+            words = ", ".join(map(repr, spec.metadata["allowed"]))
+            raise ValueError(f"{spec.name} is {value!r}; allowed: {words}")
+        return
+    whole = isinstance(spec.default, int)
+    kinds: Any = int | np.integer if whole else int | float | np.integer | np.floating
+    if isinstance(value, bool) or not isinstance(value, kinds):
+        raise TypeError(
+            f"{spec.name} is {value!r}; expected {'a whole number' if whole else 'a number'}"
+        )
+    low, high, unit = spec.metadata["low"], spec.metadata["high"], spec.metadata["unit"]
+    if not low <= value <= high:
+        raise ValueError(f"{spec.name} is {value!r}; allowed: {low} to {high} {unit}".rstrip())
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Return the Euclidean length along the last axis, axis after axis: the same bits for any n."""
+    square = vectors[..., 0] * vectors[..., 0]
+    for axis in range(1, vectors.shape[-1]):
+        square = square + vectors[..., axis] * vectors[..., axis]
+    return np.sqrt(square)
+
+
+def mean(values: np.ndarray) -> np.ndarray:
+    """Return the mean along axis 1, summed in order: the same bits for any number of worlds."""
+    return np.cumsum(values, axis=1)[:, -1] / values.dtype.type(values.shape[1])
+
+
+Policy = Callable[[np.ndarray], np.ndarray]

@@ -1,0 +1,164 @@
+"""A rope on a gripper: bring its free end to a point and settle it there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from pbd_gym.physics import Model, ModelBuilder, shapes
+from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, length, number
+from pbd_gym.tasks.rewards import closeness
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rope(Task):
+    """A rope hangs from a gripper; its free end must come to the goal and rest there.
+
+    ## Description
+    A rope of 24 particles and 1 m hangs in a vertical plane from a gripper that the agent moves.
+    The goal is a point that the hanging rope can reach: the agent has to get there quickly and to
+    end the sway that its own motion causes. Every link is solved directly, so the rope keeps its
+    length however it is swung.
+
+    ## Action Space
+    `Box(-1, 1, (2,), float32)`
+
+    | Num | Action                       | Min | Max | Unit        |
+    |-----|------------------------------|-----|-----|-------------|
+    | 0   | gripper's desired velocity x | -1  | 1   | `max_speed` |
+    | 1   | gripper's desired velocity y | -1  | 1   | `max_speed` |
+
+    The gripper's velocity follows with at most `max_acceleration` along each axis and brakes before
+    the edges of its workspace, x in [-1, 1] m, y in [-0.5, 1] m. Actions beyond [-1, 1] are clipped.
+
+    ## Observation Space
+    `Box(-10, 10, (4 N,), float32)` for N observed particles (24, or 10 with
+    `observation="keypoints"`): gripper's position relative to the workspace's centre [m] (2) and velocity
+    [max_speed] (2); of all other particles the positions relative to the gripper [rope lengths] (2N - 2),
+    then their velocities [2 m/s] (2N - 2); last the goal relative to the gripper [rope lengths] (2), less
+    2 as the gripper itself is not repeated.
+
+    ## Rewards
+    exp(-5 d / L) in [0, 1] for the distance d of the free end from the goal and the rope's length L.
+
+    ## Starting State
+    The rope hangs at rest from a gripper drawn uniformly from its workspace. The goal is uniform
+    over where the free end of a rope hanging from the workspace can be: x in [-1, 1], y in [-0.5, 1] - L.
+
+    ## Episode End
+    Truncated after 100 steps. Success: d < 0.05 L at each of the last 10 steps. Terminated only if
+    the simulation diverges, which does not happen with the defaults.
+
+    ## Arguments
+    ```python
+    >>> import gymnasium
+    >>> env = gymnasium.make("pbd_gym:PBDRope-v0", particles=32, mass=0.5)
+    >>> observation, info = env.reset(seed=1, options={"goal": [0.5, -0.5]})
+
+    ```
+    Every field of the class is a keyword. `reset` takes the options `gripper` and `goal` (x, y) [m].
+
+    ## Version History
+    * v0: first version
+    """
+
+    particles: int = number(24, 10, 1000)  # type: ignore[assignment]
+    length: float = number(1.0, 0.1, 1.0, "m")
+    mass: float = number(0.2, 1e-3, 1e3, "kg")
+    compliance: float = number(0.0, 0.0, 1.0, "m/N")
+    bending_stiffness: float = number(0.0, 0.0, 1e3, "N m2")
+
+    hold_steps: ClassVar[int] = 10
+
+    def build(self) -> Model:
+        """Build the hanging rope, pinned at its first particle."""
+        builder = ModelBuilder(2)
+        indices = shapes.rope(
+            builder,
+            (0.0, 0.0),
+            (0.0, -self.length),
+            self.particles,
+            mass=self.mass,
+            compliance=self.compliance,
+            bending_stiffness=self.bending_stiffness,
+        )
+        builder.pin(indices[0])
+        return builder.build(gravity=(0.0, -self.gravity), damping=self.damping, iterations=2)
+
+    def workspace(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners of the gripper's workspace."""
+        return np.array([-1.0, -0.5]), np.array([1.0, 1.0])
+
+    @property
+    def view(self) -> tuple[np.ndarray, np.ndarray]:
+        """The workspace and what hangs below it."""
+        return np.array([-1.3, -0.6 - self.length]), np.array([1.3, 1.1])
+
+    def declare_draws(self) -> dict[str, Draw]:
+        """Draw the gripper, and the goal from below any place of the gripper."""
+        lower, upper = self.workspace()
+        drop = np.array([0.0, self.length])
+        return {"gripper": draw(lower, upper), "goal": draw(lower - drop, upper - drop)}
+
+    def start(self, quantities: dict[str, np.ndarray]) -> Start:
+        """Hang the rope straight down, at rest."""
+        x = (self.model.positions + quantities["gripper"][:, None]).astype(np.float32)
+        return Start(x, np.zeros_like(x), {"goal": quantities["goal"].astype(np.float32)})
+
+    @cached_property
+    def _observed(self) -> np.ndarray:
+        """Indices of the observed particles below the gripper."""
+        count = self.particles if self.observation == "particles" else 10
+        return np.round(np.linspace(0, self.particles - 1, count)).astype(np.int64)[1:]
+
+    def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
+        """Return gripper, rope relative to the gripper, and goal relative to the gripper."""
+        worlds, real = len(x), x.dtype.type
+        gripper = x[:, 0]
+        scale = real(1.0 / self.length)
+        shape = (x[:, self._observed] - gripper[:, None]) * scale
+        motion = v[:, self._observed] * real(0.5)
+        centre = real(0.5) * sum(self.workspace()).astype(x.dtype)
+        return np.concatenate(
+            [
+                gripper - centre,
+                v[:, 0] * real(1.0 / self.max_speed),
+                shape.reshape(worlds, -1),
+                motion.reshape(worlds, -1),
+                (variables["goal"] - gripper) * scale,
+            ],
+            axis=1,
+        )
+
+    def judge(
+        self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
+    ) -> Judgement:
+        """Judge by the distance of the free end from the goal."""
+        distance = length(x[:, -1] - variables["goal"]).astype(np.float64)
+        reward = closeness(distance, 0.2 * self.length)
+        return Judgement(reward, distance < self.goal_radius, -distance, {"distance": distance})
+
+    def goal(self, variables: Variables, world: int) -> np.ndarray:
+        """Only the free end has a goal."""
+        positions = np.full((self.particles, 2), np.nan)
+        positions[-1] = variables["goal"][world]
+        return positions
+
+    @property
+    def goal_radius(self) -> float:
+        """Within 5 % of the rope's length the goal is met [m]."""
+        return 0.05 * self.length
+
+    def scripted(self, observation: np.ndarray) -> np.ndarray:
+        """Bring the gripper above the goal slowly enough that little sway is left to damp."""
+        tip = observation[:, 2 + 2 * len(self._observed) : 4 + 2 * len(self._observed)] * self.length
+        tip_velocity = observation[:, -4:-2] * 2.0
+        gripper_to_goal = observation[:, -2:] * self.length
+        above = gripper_to_goal + np.array([0.0, self.length])
+        # follow the place above the goal; lean with the swing, which takes energy out of it
+        velocity = 2.5 * above
+        velocity[:, 0] += 0.9 * tip[:, 0] + 0.3 * tip_velocity[:, 0]
+        return np.clip(velocity / self.max_speed, -1.0, 1.0).astype(np.float32)
