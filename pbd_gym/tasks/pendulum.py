@@ -1,0 +1,197 @@
+"""Pendulums of one to five links on a rail: swing up by moving the pivot, and balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from pbd_gym.physics import Model, ModelBuilder, shapes
+from pbd_gym.physics.portable import cos_sin
+from pbd_gym.tasks.balancing import SwingUp
+from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, length, number
+from pbd_gym.tasks.rewards import near, quiet
+
+_PI = 3.141592653589793
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pendulum(Task):
+    """A pendulum hangs from a pivot on a rail; it must be swung up and balanced near the middle.
+
+    ## Description
+    `links` massless rods of equal length, 1 m together, with a bob of 1 kg at the end of each, hang
+    from a pivot that the agent moves along a horizontal rail of 3 m. Second-order integration keeps
+    the energy of a free pendulum to 0.1 % over minutes.
+
+    ## Action Space
+    `Box(-1, 1, (1,), float32)`: desired velocity of the pivot along the rail in units of
+    `max_speed` (3 m/s). The pivot's velocity follows with at most `max_acceleration` (30 m/s2) and
+    brakes before the ends of the rail. Actions beyond [-1, 1] are clipped.
+
+    ## Observation Space
+    `Box(-10, 10, (2 + 4 links,), float32)`; both kinds of observation are the same here.
+
+    | Num               | Observation                                             | Unit                   |
+    |-------------------|---------------------------------------------------------|------------------------|
+    | 0                 | pivot's position                                        | half the rail          |
+    | 1                 | pivot's velocity                                        | `max_speed`            |
+    | 2 ... 1 + 2 links | direction of each link, from its pivot to its bob, x, y | link lengths           |
+    | then 2 links      | velocity of each bob relative to its own pivot, x, y    | 5 link lengths / s     |
+
+    ## Rewards
+    The product of dm_control's swing-up task, in [0, 1]: upright * (1 + centred)/2 * (1 + slow)/2 *
+    (4 + quiet)/5 with upright = mean of (1 + cos theta_i)/2, centred = tolerance of the pivot's
+    position (0.1 at the rail's end), slow = least tolerance of the links' angular velocities (0.1
+    at 5 rad/s), quiet = 1 - action^2.
+
+    ## Starting State
+    The pivot rests in the middle, every link within 0.1 rad of hanging down, with rates within
+    0.1 rad/s.
+
+    ## Episode End
+    Truncated after 500 steps (10 s). Success: over the last 50 steps every cos theta_i > 0.99 (0.98
+    with more than one link) and the pivot within 0.75 of half the rail. Terminated only if the
+    simulation diverges, which does not happen with the defaults.
+
+    ## Arguments
+    ```python
+    >>> import gymnasium
+    >>> env = gymnasium.make("pbd_gym:PBDDoublePendulum-v0", gravity=1.62)
+    >>> observation, info = env.reset(seed=1, options={"angles": [3.0, 3.0]})
+
+    ```
+    Every field of the class is a keyword. `reset` takes the options `angles` [rad from hanging down, each
+    link's own], `rates` [rad/s] and `pivot` [m].
+
+    ## Version History
+    * v0: first version
+    """
+
+    links: int = number(1, 1, 5)  # type: ignore[assignment]
+    length: float = number(1.0, 0.1, 10.0, "m")
+    mass: float = number(1.0, 1e-3, 1e3, "kg")
+    rail: float = number(1.5, 0.1, 100.0, "m")
+    control_rate: float = number(50.0, 1.0, 1000.0, "Hz")
+    substeps: int = number(10, 1, 1000)  # type: ignore[assignment]
+    max_speed: float = number(3.0, 1e-3, 100.0, "m/s")
+    max_acceleration: float = number(30.0, 1e-3, 1000.0, "m/s2")
+    damping: float = number(0.0, 0.0, 100.0, "1/s")
+
+    hold_steps: ClassVar[int] = 50
+    best_performance: ClassVar[float] = 1.0
+    action_axes: ClassVar[tuple[int, ...]] = (0,)
+
+    @property
+    def link_length(self) -> float:
+        """Length of a link [m]."""
+        return self.length / self.links
+
+    def build(self) -> Model:
+        """Build the hanging pendulum."""
+        builder = ModelBuilder(2)
+        lengths, masses = [self.link_length] * self.links, [self.mass] * self.links
+        shapes.pendulum(builder, (0.0, 0.0), lengths, masses)
+        return builder.build(
+            gravity=(0.0, -self.gravity),
+            damping=self.damping,
+            integrator="rattle",
+            iterations=2,
+        )
+
+    def workspace(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ends of the rail."""
+        return np.array([-self.rail, 0.0]), np.array([self.rail, 0.0])
+
+    @property
+    def view(self) -> tuple[np.ndarray, np.ndarray]:
+        """The rail and the circle that the pendulum reaches."""
+        reach = 1.15 * self.length
+        return np.array([-self.rail - 0.3, -reach]), np.array([self.rail + 0.3, reach])
+
+    def declare_draws(self) -> dict[str, Draw]:
+        """Draw small angles and rates; the pivot starts in the middle."""
+        small, whole = np.full(self.links, 0.1), np.full(self.links, _PI)
+        return {
+            "angles": draw(-small, small, -whole, whole),
+            "rates": draw(-small, small, -100.0 * small, 100.0 * small),
+            "pivot": draw(0.0, 0.0, -self.rail, self.rail),
+        }
+
+    def start(self, quantities: dict[str, np.ndarray]) -> Start:
+        """Place the links at their angles, turning at their rates."""
+        cosine, sine = cos_sin(quantities["angles"])
+        link = self.link_length
+        offset = link * np.stack([sine, -cosine], axis=2)
+        motion = link * np.stack([cosine, sine], axis=2) * quantities["rates"][:, :, None]
+        x = np.zeros((len(cosine), self.links + 1, 2))
+        v = np.zeros_like(x)
+        x[:, 1:] = np.cumsum(offset, axis=1)
+        v[:, 1:] = np.cumsum(motion, axis=1)
+        x[:, :, 0] += quantities["pivot"]
+        return Start(x.astype(np.float32), v.astype(np.float32), {})
+
+    def _links(self, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return each link as a vector and its rate of change in link lengths, (n, links, 2)."""
+        scale = x.dtype.type(1.0 / self.link_length)
+        return (x[:, 1:] - x[:, :-1]) * scale, (v[:, 1:] - v[:, :-1]) * scale
+
+    def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
+        """Return the pivot, the links' directions and their rates of change."""
+        worlds, real = len(x), x.dtype.type
+        direction, motion = self._links(x, v)
+        return np.concatenate(
+            [
+                x[:, 0, :1] * real(1.0 / self.rail),
+                v[:, 0, :1] * real(1.0 / self.max_speed),
+                direction.reshape(worlds, -1),
+                motion.reshape(worlds, -1) * real(0.2),
+            ],
+            axis=1,
+        )
+
+    def judge(
+        self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
+    ) -> Judgement:
+        """Judge as dm_control judges its cart-pole."""
+        direction, motion = (part.astype(np.float64) for part in self._links(x, v))
+        height = np.clip(direction[:, :, 1], -1.0, 1.0)
+        pivot = x[:, 0, 0].astype(np.float64)
+        upright = np.cumsum(0.5 * (1.0 + height), axis=1)[:, -1] / self.links
+        terms = {
+            "upright": upright,
+            "centred": near(pivot, self.rail),
+            # links keep their length, so the rate of a direction is the angular velocity
+            "slow": near(length(motion), 5.0).min(axis=1),
+            "quiet": quiet(action[:, 0]),
+        }
+        reward = upright * (1.0 + terms["centred"]) * (1.0 + terms["slow"]) * (4.0 + terms["quiet"])
+        least = 0.99 if self.links == 1 else 0.98
+        reached = (height > least).all(axis=1) & (np.abs(pivot) < 0.75 * self.rail)
+        return Judgement(reward / 20.0, reached, upright, terms)
+
+    @cached_property
+    def _swing_up(self) -> SwingUp:
+        return SwingUp(
+            links=self.links,
+            link_length=self.link_length,
+            gravity=self.gravity,
+            dt=1.0 / self.control_rate,
+            max_speed=self.max_speed,
+            max_acceleration=self.max_acceleration,
+            rail=self.rail,
+        )
+
+    def scripted(self, observation: np.ndarray) -> np.ndarray:
+        """Pump energy in until the links pass the top slowly, then balance by linear feedback."""
+        observation = observation.astype(np.float64)
+        count = 2 * self.links
+        shape = (len(observation), self.links, 2)
+        return self._swing_up.act(
+            pivot=observation[:, 0] * self.rail,
+            velocity=observation[:, 1] * self.max_speed,
+            direction=observation[:, 2 : 2 + count].reshape(shape),
+            motion=observation[:, 2 + count :].reshape(shape) * 5.0,
+        )
