@@ -10,20 +10,31 @@ from typing import Any
 
 import numpy as np
 
+from pbd_gym.physics.compiling import kernel
+
 
 def exp(y: Any) -> np.ndarray:
     """Return e^y for y <= 0, elementwise in float64; relative error below 1e-13.
 
-    e^y = (e^(y/256))^256: a Taylor polynomial on [-0.25, 0], then eight squarings. Values below -64
-    give e^-64, which is 0 for every reward.
+    Values below -64 give e^-64, which is 0 for every reward.
     """
-    small = np.maximum(np.asarray(y, dtype=np.float64), -64.0) * (1.0 / 256.0)
-    total = np.ones_like(small)
-    for degree in range(11, 0, -1):
-        total = 1.0 + total * small * (1.0 / degree)
-    for _ in range(8):
-        total = total * total
-    return total
+    values = np.asarray(y, dtype=np.float64, order="C")
+    result = np.empty(values.shape)
+    _exp(values.reshape(-1), result.reshape(-1))
+    return result
+
+
+@kernel
+def _exp(values: Any, result: Any) -> None:
+    """e^y = (e^(y/256))^256: a Taylor polynomial on [-0.25, 0], then eight squarings."""
+    for index in range(values.shape[0]):
+        small = max(values[index], -64.0) * (1.0 / 256.0)
+        total = 1.0
+        for degree in range(11, 0, -1):
+            total = 1.0 + total * small * (1.0 / degree)
+        for _ in range(8):
+            total = total * total
+        result[index] = total
 
 
 def cos_sin(angle: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from pbd_gym.physics import Model
+from pbd_gym.tasks.driving import drive_pins
 
 Variables = dict[str, np.ndarray]
 # Observations are scaled to about [-1, 1] and clipped here, so that their bounds are finite.
@@ -180,63 +181,28 @@ class Task:
     def pin_targets(
         self, x: np.ndarray, v: np.ndarray, action: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Turn actions into pin targets at the end of the control step.
-
-        The pins' velocities follow the desired ones with at most `max_acceleration` along each
-        axis. They brake in time to stop at the edges of the workspace: from u the way to a stop is
-        u dt + u^2/(2 a), which gives the greatest speed at a distance.
-
-        Args:
-            x: Positions (n, N, dim) [m].
-            v: Velocities (n, N, dim) [m/s].
-            action: (n, size) in [-1, 1].
+        """Turn actions (n, size) in [-1, 1] into pin targets at the end of the control step.
 
         Returns:
             Targets (n, P, dim) [m], and by how much the pins' velocities fall short of the desired
             ones, (n,) in units of `max_speed`.
         """
-        real = x.dtype.type
-        dt, acceleration = real(1.0 / self.control_rate), real(self.max_acceleration)
-        pins = self.model.pins
-        position, velocity = x[:, pins], v[:, pins]
-        desired = np.zeros_like(position)
-        desired[:, :, list(self.action_axes)] = real(self.max_speed) * action.reshape(
-            len(x), len(pins), -1
-        )
-        change = acceleration * dt
-        reached = velocity + np.clip(desired - velocity, -change, change)
-        lower, upper = (corner.astype(x.dtype) for corner in self.workspace())
-        reached = np.minimum(reached, _braking_speed(upper - position, acceleration, dt))
-        reached = np.maximum(reached, -_braking_speed(position - lower, acceleration, dt))
-        targets = np.clip(position + reached * dt, lower, upper)
-        if len(pins) == 2:
-            targets = _keep_together(targets, real(self.span()))
-        short = np.abs(desired - (targets - position) / dt).max(axis=(1, 2)) / real(self.max_speed)
+        pins, axes, workspace, limits = self._driving
+        targets = np.empty((len(x), len(pins), self.model.dim), dtype=x.dtype)
+        short = np.empty(len(x), dtype=x.dtype)
+        drive_pins(x, v, action, pins, axes, workspace, limits, targets, short)
         return targets, short
 
-
-def _braking_speed(distance: np.ndarray, acceleration: Any, dt: Any) -> np.ndarray:
-    """Return the greatest speed from which a pin can stop within a distance [m/s]."""
-    way = np.maximum(distance, 0)
-    return acceleration * (np.sqrt(dt * dt + (way + way) / acceleration) - dt)
-
-
-def _keep_together(targets: np.ndarray, span: Any) -> np.ndarray:
-    """Draw two pins together to the distance that their body can span; their middle stays."""
-    apart = targets[:, 1] - targets[:, 0]
-    square = apart[:, 0] * apart[:, 0]
-    for axis in range(1, apart.shape[1]):
-        square = square + apart[:, axis] * apart[:, axis]
-    distance = np.sqrt(square)
-    too_far = distance > span
-    if not too_far.any():
-        return targets
-    share = np.where(too_far, span / np.maximum(distance, span), 1).astype(targets.dtype)
-    half = targets.dtype.type(0.5)
-    middle = (targets[:, 0] + targets[:, 1]) * half
-    reach = apart * (share * half)[:, None]
-    drawn = np.stack([middle - reach, middle + reach], axis=1)
-    return np.where(too_far[:, None, None], drawn, targets)
+    @cached_property
+    def _driving(self) -> tuple[np.ndarray, ...]:
+        """Constants of `drive_pins`, in the dtype of the worlds."""
+        limits = [1.0 / self.control_rate, self.max_speed, self.max_acceleration, self.span()]
+        return (
+            self.model.pins.copy(),
+            np.array(self.action_axes),
+            np.array(self.workspace(), dtype=np.float32),
+            np.array(limits, dtype=np.float32),
+        )
 
 
 def _check_field(spec: Any, value: Any) -> None:

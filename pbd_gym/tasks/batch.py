@@ -10,6 +10,9 @@ from pbd_gym.physics import Snapshot, World
 from pbd_gym.tasks.base import Task, Variables
 
 
+_LEAST, _GREATEST = np.float32(-1.0), np.float32(1.0)
+
+
 class Outcome(NamedTuple):
     """What a step gave, each (W,).
 
@@ -126,7 +129,7 @@ class Batch:
     def step(self, actions: np.ndarray) -> Outcome:
         """Advance every world by one control step; actions as `check_actions` returns them."""
         task, world = self.task, self.world
-        clipped = np.clip(actions, -1.0, 1.0)
+        clipped = np.minimum(np.maximum(actions, _LEAST), _GREATEST)
         targets, short = task.pin_targets(world.x, world.v, clipped)
         world.step(1.0 / task.control_rate, task.substeps, targets)
         diverged = self._put_back_diverged()
@@ -162,7 +165,7 @@ class Batch:
         """Return the observations, a fresh float32 array (W, size) within the space's bounds."""
         space = self.task.observation_space
         observation = self.task.observe(self.world.x, self.world.v, self.variables)
-        return np.clip(observation, space.low[0], space.high[0], dtype=np.float32)
+        return np.minimum(np.maximum(observation, space.low[0]), space.high[0])
 
     def get_state(self) -> tuple[Snapshot, Variables]:
         """Return copies of all that a continuation depends on."""
