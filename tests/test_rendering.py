@@ -308,9 +308,9 @@ HEADLESS = """
 import os, sys
 for name in [n for n in os.environ if n.startswith(("SDL", "PYGAME", "DISPLAY", "WAYLAND"))]:
     del os.environ[name]
-before = dict(os.environ)
 from pbd_gym.physics import ModelBuilder, shapes
 from pbd_gym.rendering import Renderer, Window, grid
+before = dict(os.environ)
 assert not {"pygame", "imageio_ffmpeg"} & set(sys.modules)
 builder = ModelBuilder(2)
 shapes.rope(builder, (0, 0), (0, -1), 5, mass=1.0)

@@ -5,6 +5,7 @@ import pytest
 
 from pbd_gym.rendering import Window
 
+SIZE = (128, 96)
 FRAME = np.zeros((96, 128, 3), dtype=np.uint8)
 FRAME[:, 64:] = (200, 100, 50)
 
@@ -19,7 +20,7 @@ def pygame(monkeypatch):
 
 
 def test_a_window_shows_the_frame(pygame):
-    with Window(0) as window:
+    with Window(SIZE, 0) as window:
         window.show(FRAME)
         screen = pygame.display.get_surface()
         assert screen.get_size() == (128, 96)
@@ -30,7 +31,7 @@ def test_a_window_shows_the_frame(pygame):
 
 
 def test_a_resized_window_keeps_the_picture_in_proportion(pygame):
-    with Window(0) as window:
+    with Window(SIZE, 0) as window:
         window.show(FRAME)
         pygame.display.set_mode((512, 192), pygame.RESIZABLE)
         window.show(FRAME)
@@ -45,7 +46,7 @@ def test_a_resized_window_keeps_the_picture_in_proportion(pygame):
 
 @pytest.mark.parametrize("leave", ["close button", "escape", "pygame.quit"])
 def test_a_window_that_the_user_closes_stays_closed_and_raises_nothing(pygame, leave):
-    window = Window(0)
+    window = Window(SIZE, 0)
     window.show(FRAME)
     assert not window.closed
     if leave == "close button":
@@ -59,7 +60,7 @@ def test_a_window_that_the_user_closes_stays_closed_and_raises_nothing(pygame, l
         assert window.closed
         assert not pygame.display.get_init()
     window.close()
-    again = Window(0)
+    again = Window(SIZE, 0)
     again.show(FRAME)
     window.close()  # the one that was closed before leaves the new one alone
     again.show(FRAME)
@@ -68,12 +69,12 @@ def test_a_window_that_the_user_closes_stays_closed_and_raises_nothing(pygame, l
 
 
 def test_a_window_that_never_showed_anything_opens_nothing(pygame):
-    Window(30).close()
+    Window(SIZE, 30).close()
     assert not pygame.display.get_init()
 
 
 def test_a_window_keeps_real_time(pygame):
-    with Window(50) as window:
+    with Window(SIZE, 50) as window:
         window.show(FRAME)
         start = time.perf_counter()
         for _ in range(10):
@@ -85,6 +86,8 @@ def test_a_window_keeps_real_time(pygame):
 def test_windows_refuse_what_they_cannot_show(pygame):
     for fps in (-1, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="fps is"):
-            Window(fps)
-    with pytest.raises(ValueError, match="expected uint8"), Window(0) as window:
+            Window(SIZE, fps)
+    with pytest.raises(ValueError, match="size is"):
+        Window((0, 96), 30)
+    with pytest.raises(ValueError, match="expected uint8"), Window(SIZE, 0) as window:
         window.show(FRAME.astype(float))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,21 +14,6 @@ from pbd_gym.rendering.palette import Colour
 
 if TYPE_CHECKING:
     import pygame
-
-_PROMPT = "PYGAME_HIDE_SUPPORT_PROMPT"
-
-
-def load_pygame() -> ModuleType:
-    """Import pygame without its greeting on stdout, and leave the environment as it was."""
-    if "pygame" in sys.modules or _PROMPT in os.environ:
-        import pygame
-    else:
-        os.environ[_PROMPT] = "1"
-        try:
-            import pygame
-        finally:
-            del os.environ[_PROMPT]
-    return pygame
 
 
 class Canvas:
@@ -49,7 +33,9 @@ class Canvas:
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
-        self._pygame = load_pygame()
+        import pygame
+
+        self._pygame: ModuleType = pygame
         # Large pictures need less smoothing and would pay most for it. Powers of two, because
         # smoothscale divides exactly by them and else darkens the picture by a shade.
         self._supersampling = 4 if max(size) <= 512 else 2

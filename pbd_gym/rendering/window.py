@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbd_gym.rendering.canvas import load_pygame
 from pbd_gym.rendering.palette import PAPER
+from pbd_gym.rendering.renderer import check_size
 from pbd_gym.rendering.video import check_frame
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ class Window:
     `closed` is True from then on and further frames are ignored. A process has one such window.
 
     Args:
+        size: Width and height of the window when it opens [pixels], as for a `Renderer`.
         fps: Frames per second; 0 for as fast as they come.
         title: In the bar of the window.
 
@@ -28,10 +29,11 @@ class Window:
         closed: Whether the window has been closed, by the user or by `close`.
     """
 
-    def __init__(self, fps: float, *, title: str = "pbd_gym") -> None:
+    def __init__(self, size: tuple[int, int], fps: float, *, title: str = "pbd_gym") -> None:
         if not (np.isfinite(fps) and fps >= 0.0):
             raise ValueError(f"fps is {fps!r}; it must be finite and at least 0")
         self.closed = False
+        self._size = check_size(size)
         self._fps = fps
         self._title = title
         self._clock: pygame.time.Clock | None = None
@@ -51,19 +53,21 @@ class Window:
         check_frame(frame)
         if self.closed:
             return
-        pygame = load_pygame()
+        import pygame
+
         height, width = frame.shape[:2]
         clock = self._clock
         if clock is None:
             pygame.display.init()
-            pygame.display.set_mode((width, height), pygame.RESIZABLE)
+            pygame.display.set_mode(self._size, pygame.RESIZABLE)
             pygame.display.set_caption(self._title)
             clock = self._clock = pygame.time.Clock()
-        if self._is_left():
+        # Somebody else may have shut pygame down.
+        screen = pygame.display.get_surface() if pygame.display.get_init() else None
+        if screen is None or self._is_left():
             self.close()
             return
         picture = pygame.image.frombuffer(frame.tobytes(), (width, height), "RGB")
-        screen = pygame.display.get_surface()
         share = min(screen.get_width() / width, screen.get_height() / height)
         if share != 1.0:
             fitted = (max(round(width * share), 1), max(round(height * share), 1))
@@ -76,14 +80,15 @@ class Window:
     def close(self) -> None:
         """Close the window; doing so twice does no harm."""
         if self._clock is not None and not self.closed:
-            load_pygame().display.quit()
+            import pygame
+
+            pygame.display.quit()
         self.closed = True
 
     def _is_left(self) -> bool:
-        """Whether the user wants to leave, or somebody else has shut pygame down."""
-        pygame = load_pygame()
-        if not pygame.display.get_init() or pygame.display.get_surface() is None:
-            return True
+        """Whether the user wants to leave."""
+        import pygame
+
         return any(
             event.type == pygame.QUIT
             or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE)
