@@ -129,7 +129,7 @@ def test_a_training_leaves_model_curve_evaluation_and_video(tmp_path, capsys):
     assert evaluate.main([str(run), "--episodes", "4", "--json", str(tmp_path / "e.json")]) == 0
     assert json.loads((tmp_path / "e.json").read_text())["policy"].endswith("best_model.zip")
     with pytest.raises(SystemExit):
-        evaluate.main([str(run), "--env", "pbd_gym:PBDPendulum-v0"])
+        evaluate.main([str(run), "--env-kwargs", "observation:keypoints"])
     assert "was trained on observations of shape" in capsys.readouterr().err
 
 

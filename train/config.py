@@ -25,12 +25,12 @@ class TrainingConfig:
 
     total_timesteps: int
     num_envs: int
+    eval_freq: int
+    checkpoint_freq: int
     env: str = DEFAULT_ENV
     algo: str = "ppo"
     seed: int = 0
-    eval_freq: int = 100_000
     eval_episodes: int = 100
-    checkpoint_freq: int = 200_000
     device: str = "cpu"
     threads: int = 1
     env_kwargs: dict[str, Any] = field(default_factory=dict)
@@ -61,9 +61,13 @@ def new_config(given: dict[str, Any]) -> TrainingConfig:
     )
     hyperparameters.update(given.pop("hyperparameters", {}))
     setup = {key: hyperparameters.pop(key) for key in SETUP if key in hyperparameters}
+    total = given.pop("total_timesteps", setup["n_timesteps"])
+    _check_at_least("total_timesteps", total, 1)
     return TrainingConfig(
-        total_timesteps=given.pop("total_timesteps", setup["n_timesteps"]),
+        total_timesteps=total,
         num_envs=given.pop("num_envs", setup["n_envs"]),
+        eval_freq=given.pop("eval_freq", -(-total // 20)),
+        checkpoint_freq=given.pop("checkpoint_freq", -(-total // 10)),
         env_kwargs=setup.get("env_kwargs", {}) | given.pop("env_kwargs", {}),
         hyperparameters=hyperparameters,
         **given,

@@ -110,7 +110,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--eval-freq",
         type=int,
         metavar="N",
-        help="steps between deterministic evaluations, 0 for none (default: 100000)",
+        help="steps between deterministic evaluations, 0 for none (default: a 20th of all)",
     )
     watch.add_argument(
         "--eval-episodes",
@@ -122,7 +122,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--checkpoint-freq",
         type=int,
         metavar="N",
-        help="steps between checkpoints, 0 for one at the end only (default: 200000)",
+        help="steps between checkpoints, 0 for one at the end only (default: a 10th of all)",
     )
     watch.add_argument(
         "--video",
