@@ -84,5 +84,5 @@ def momenta(state) -> tuple[np.ndarray, np.ndarray]:
     """Linear [kg m/s] and angular momentum [kg m2/s] of world 0, whose particles are all free."""
     mass = 1.0 / state.model.inverse_mass[:, None]
     x, v = state.x[0], state.v[0]
-    spin = mass * (x[:, :, None] * v[:, None, :] - x[:, None, :] * v[:, :, None])
+    spin = mass[:, None] * (x[:, :, None] * v[:, None, :] - x[:, None, :] * v[:, :, None])
     return np.sum(mass * v, axis=0), np.sum(spin, axis=0)

@@ -21,7 +21,8 @@ def test_pbd_flies_along_the_parabola_of_its_own_difference_equation():
     n, h = STEPS * SUBSTEPS, DT / SUBSTEPS
     x, v = thrown()
     # exact for v += g h, x += v h; what is left is the rounding of 500 substeps, 500 * 2e-16 * 5 m
-    np.testing.assert_allclose(x, START + n * h * VELOCITY + G / 2 * n * h * (n * h + h), atol=1e-12)
+    expected = START + n * h * VELOCITY + G / 2 * n * h * (n * h + h)
+    np.testing.assert_allclose(x, expected, atol=1e-12)
     # v is read off positions that carry a rounding error of 1e-15 m each, divided by h = 2e-3 s
     np.testing.assert_allclose(v, VELOCITY + n * h * G, atol=1e-10)
 

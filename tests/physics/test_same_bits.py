@@ -1,0 +1,100 @@
+"""The same model, start and actions give the same bits, however the worlds are computed."""
+
+import hashlib
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import cloth_3d, pendulum_2d, rope_2d
+
+import pbd_gym
+from pbd_gym.physics import World
+
+WORLDS = 35  # a tile of 32 lanes and a remainder of 3, or four tiles of 8 and a remainder of 3
+STEPS = 6
+
+MODELS = {
+    "rope": lambda: rope_2d(12, pins=[0], rope={"bending_stiffness": 1e-3}, iterations=2),
+    "pendulum": lambda: pendulum_2d((0.5, 0.5), (1.0, 2.0), integrator="rattle", iterations=2),
+    "cloth": lambda: cloth_3d((5, 5), height=0.05, pins=[(0, 0), (0, 4)]),
+}
+
+
+def run(name, num_worlds, *, dtype=np.float32, **keywords):
+    """Positions and velocities after a few steps in which every world has motions of its own."""
+    model = MODELS[name]()
+    state = World(model, num_worlds, dtype=dtype, **keywords)
+    random = np.random.default_rng(7)
+    state.v[:] = random.normal(scale=0.5, size=(WORLDS, *state.v.shape[1:]))[:num_worlds]
+    targets = state.x[:, model.pins].copy()
+    for _ in range(STEPS):
+        shift = random.normal(scale=0.02, size=(WORLDS, *targets.shape[1:]))
+        targets += shift[:num_worlds].astype(dtype)
+        state.step(1 / 30, 7, targets=targets)
+    return np.concatenate([state.x, state.v], axis=1)
+
+
+@cache
+def one_by_one(name, dtype):
+    """All worlds in scalar code on one thread."""
+    return run(name, WORLDS, dtype=dtype, lanes=1, num_threads=1)
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(("lanes", "dtype"), [(8, np.float64), (32, np.float32)])
+@pytest.mark.parametrize("num_threads", [1, 2])
+def test_lanes_and_threads_do_not_change_a_bit(name, lanes, dtype, num_threads):
+    several = run(name, WORLDS, dtype=dtype, lanes=lanes, num_threads=num_threads)
+    np.testing.assert_array_equal(several, one_by_one(name, dtype))
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_two_threads_do_not_change_a_bit_of_scalar_code(name, dtype):
+    two = run(name, WORLDS, dtype=dtype, lanes=1, num_threads=2)
+    np.testing.assert_array_equal(two, one_by_one(name, dtype))
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("num_worlds", [1, 2, 7, 8, 9, 31, 32, 33])
+def test_a_world_does_not_depend_on_how_many_there_are(name, num_worlds):
+    chosen = run(name, num_worlds)  # lanes and threads as chosen for this number
+    np.testing.assert_array_equal(chosen, one_by_one(name, np.float32)[:num_worlds])
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_second_run_repeats_the_first(name):
+    np.testing.assert_array_equal(run(name, 3), run(name, 3))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_worlds_differ_where_their_motions_differ(name):
+    worlds = one_by_one(name, np.float32)
+    assert len(np.unique(worlds.reshape(WORLDS, -1), axis=0)) == WORLDS
+
+
+def digest(name):
+    """Hash of a few worlds in lanes."""
+    return hashlib.sha256(run(name, 9, lanes=32, num_threads=1).tobytes()).hexdigest()
+
+
+def test_a_processor_without_vector_extensions_computes_the_same_bits():
+    # each of these is compiled for that processor too, into a cache folder of its own
+    names = ("rope", "cloth")
+    code = f"import test_same_bits as t; print(*map(t.digest, {names!r}))"
+    folders = [Path(__file__).parent, Path(pbd_gym.__file__).parents[1]]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(map(str, folders)),
+        "NUMBA_CPU_NAME": "generic",
+        "NUMBA_CPU_FEATURES": "",
+    }
+    result = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.split() == [digest(name) for name in names]
