@@ -109,7 +109,9 @@ def _check_chains(columns: dict[str, Any]) -> None:
     wrong = ~(np.isfinite(rest) & (rest > 0.0))
     _refuse_if(wrong, "rest length of chain entry", rest, "it must be positive and finite [m]")
     _check_compliance(columns["link_compliance"], "chain entry")
-    _check_compliance(columns["link_compression_compliance"], "chain entry under compression")
+    greatest = columns["link_greatest_length"]
+    wrong = ~(greatest >= rest)
+    _refuse_if(wrong, "greatest length of chain entry", greatest, "a strain limit is at least 0")
     inner = np.ones(len(particles), dtype=bool)
     inner[offsets[1:] - 1] = False
     starts = np.flatnonzero(inner)

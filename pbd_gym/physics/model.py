@@ -60,7 +60,7 @@ class Model:
         chain_particles: (L,) particle of each chain entry, chain after chain.
         link_rest: (L,) rest length of the link that starts at an entry [m]; the last is unused.
         link_compliance: (L,) of a stretched link [m/N].
-        link_compression_compliance: (L,) of a compressed link [m/N].
+        link_greatest_length: (L,) beyond which a link is cut short after all else [m].
         distance_pairs: (E, 2) particles.
         distance_rest: (E,) [m].
         distance_compliance: (E,) [m/N].
@@ -89,7 +89,7 @@ class Model:
     chain_particles: np.ndarray
     link_rest: np.ndarray
     link_compliance: np.ndarray
-    link_compression_compliance: np.ndarray
+    link_greatest_length: np.ndarray
     distance_pairs: np.ndarray
     distance_rest: np.ndarray
     distance_compliance: np.ndarray
@@ -200,7 +200,7 @@ class ModelBuilder:
         *,
         rest: Any = None,
         compliance: float = 0.0,
-        compression_compliance: float | None = None,
+        strain_limit: float = np.inf,
     ) -> None:
         """Link particles in a row; all links of the chain are solved together, directly.
 
@@ -208,15 +208,15 @@ class ModelBuilder:
             particles: Two or more particle indices, in order.
             rest: Rest length of the links [m], one or one each; as placed where None.
             compliance: Of a link under tension [m/N]; 0 is inextensible.
-            compression_compliance: Of a link under compression [m/N]; as `compliance` where None.
+            strain_limit: Strain beyond which a link is cut short whatever pulls on it; +inf for no
+                limit. For cloth, whose crossing threads are solved in turn.
         """
         entries = np.asarray(particles, dtype=np.int64).reshape(-1)
         if rest is None:
             lengths = [self._length(i, j) for i, j in zip(entries[:-1], entries[1:], strict=True)]
         else:
             lengths = np.broadcast_to(np.asarray(rest, dtype=np.float64), (max(len(entries) - 1, 0),))
-        compression = compliance if compression_compliance is None else compression_compliance
-        self._chains.append((entries, np.array(lengths), float(compliance), float(compression)))
+        self._chains.append((entries, np.array(lengths), float(compliance), float(strain_limit)))
 
     def add_distance(
         self,
@@ -342,7 +342,8 @@ class ModelBuilder:
             "chain_particles": _joined([entries for entries, *_ in self._chains], np.int64),
             "link_rest": _joined(rests, np.float64),
             "link_compliance": np.repeat([row[2] for row in self._chains], sizes),
-            "link_compression_compliance": np.repeat([row[3] for row in self._chains], sizes),
+            "link_greatest_length": _joined(rests, np.float64)
+            * (1.0 + np.repeat([row[3] for row in self._chains], sizes)),
             "distance_pairs": pairs,
             "distance_rest": distances[:, 0].copy(),
             "distance_compliance": distances[:, 1].copy(),

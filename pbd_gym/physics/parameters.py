@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 class Parameters(NamedTuple):
     """A Model as the kernels read it: the arrays of `pbd_gym.physics.Model` in the state's dtype."""
 
+    positions: Any
     inverse_mass: Any
     gravity: Any
     pins: Any
@@ -15,7 +16,7 @@ class Parameters(NamedTuple):
     chain_particles: Any
     link_rest: Any
     link_compliance: Any
-    link_compression_compliance: Any
+    link_greatest_length: Any
     distance_pairs: Any
     distance_rest: Any
     distance_compliance: Any

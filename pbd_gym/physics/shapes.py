@@ -96,7 +96,7 @@ def cloth(
     *,
     mass: float,
     stretch_compliance: float = 1e-6,
-    compression_compliance: float | None = None,
+    strain_limit: float = 0.02,
     shear_compliance: float = 1e-3,
     bending_compliance: float = 1e-1,
     collision_distance: float = 0.0,
@@ -115,7 +115,7 @@ def cloth(
         shape: Rows and columns, at least 2 each.
         mass: Of the whole cloth [kg].
         stretch_compliance: Of a link under tension [m/N].
-        compression_compliance: Of a link under compression [m/N]; as under tension where None.
+        strain_limit: Strain beyond which a link is cut short whatever pulls on it.
         shear_compliance: Of a diagonal [m/N].
         bending_compliance: l^3/EI [m/N].
         collision_distance: That the particles keep from each other [m]; 0 for none.
@@ -142,7 +142,7 @@ def cloth(
         builder.add_chain(
             thread,
             compliance=stretch_compliance,
-            compression_compliance=compression_compliance,
+            strain_limit=strain_limit,
         )
     if collision_distance > 0.0:
         builder.set_self_collision(indices, collision_distance)

@@ -36,7 +36,6 @@ def project_chains(work, model, inverse_h2, iteration):
     """Bring the links of every chain to their lengths, along their current directions."""
     offsets, particles = model.chain_offsets, model.chain_particles
     inverse_mass, rest, compliance = model.inverse_mass, model.link_rest, model.link_compliance
-    compression = model.link_compression_compliance
     zero_row = row(work, work.shape[0] - 1)
     for chain in range(offsets.shape[0] - 1):
         first, last = offsets[chain], offsets[chain + 1] - 1
@@ -52,7 +51,6 @@ def project_chains(work, model, inverse_h2, iteration):
                 inverse_mass[j],
                 rest[entry],
                 _stiffened(compliance, entry, inverse_h2, iteration),
-                _stiffened(compression, entry, inverse_h2, iteration),
             )
             before = link
         _back_substitute(work, particles, inverse_mass, first, last, POSITION)
@@ -121,7 +119,7 @@ def _stiffened(compliance, entry, inverse_h2, iteration):
 
 
 @kernel
-def _eliminate_current(before, a, b, mass_a, mass_b, rest, stretch, compression):
+def _eliminate_current(before, a, b, mass_a, mass_b, rest, alpha):
     """Eliminate the link before this one; the direction is the current one."""
     real = type(mass_a)
     one, zero = real(1), real(0)
@@ -139,7 +137,6 @@ def _eliminate_current(before, a, b, mass_a, mass_b, rest, stretch, compression)
             delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             cosine += delta * inverse * before[DIRECTION + k * LANES + lane]
             a[DIRECTION + k * LANES + lane] = delta * inverse
-        alpha = stretch if error >= zero else compression
         coupling = -mass_a * cosine
         factor = coupling * before[PIVOT + lane]
         diagonal = mass_a + mass_b + alpha
@@ -238,3 +235,38 @@ def _apply(a, b, after, mass_a, mass_b, quantity):
             move = step * a[DIRECTION + k * LANES + lane]
             a[quantity + k * LANES + lane] -= mass_a * move
             b[quantity + k * LANES + lane] += mass_b * move
+
+
+@kernel
+def limit_strains(work, model):
+    """Shorten links that are stretched beyond their limit, one after another.
+
+    Threads that cross are solved in turn, so the last ones leave an error in the others; where a
+    cloth is pulled taut between its pins it would take many turns to vanish.
+    """
+    offsets, particles = model.chain_offsets, model.chain_particles
+    inverse_mass, greatest = model.inverse_mass, model.link_greatest_length
+    for chain in range(offsets.shape[0] - 1):
+        for entry in range(offsets[chain], offsets[chain + 1] - 1):
+            if greatest[entry] < np.inf:
+                i, j = particles[entry], particles[entry + 1]
+                _shorten(row(work, i), row(work, j), inverse_mass[i], inverse_mass[j], greatest[entry])
+
+
+@kernel
+def _shorten(a, b, mass_a, mass_b, greatest):
+    real = type(mass_a)
+    one, zero = real(1), real(0)
+    total = mass_a + mass_b
+    share = one / total if total > zero else zero
+    for lane in range(LANES):
+        square = zero
+        for k in range(DIM):
+            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            square += delta * delta
+        length = np.sqrt(square)
+        scale = share * (one - greatest / length) if length > greatest else zero
+        for k in range(DIM):
+            move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
+            a[POSITION + k * LANES + lane] -= mass_a * move
+            b[POSITION + k * LANES + lane] += mass_b * move

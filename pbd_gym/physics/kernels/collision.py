@@ -13,6 +13,11 @@ from .layout import DIM, LANES, POSITION, START, VELOCITY
 # Pairs are sought within this many collision distances at most: faster particles would meet
 # undetected, but a cloth would rather fill the list with pairs that never touch.
 _FARTHEST = 3.0
+# Particles built closer to each other than this many collision distances are neighbours in the
+# body: its own constraints hold them apart.
+_NEIGHBOURHOOD = 3.0
+# Speed at which overlapping particles are let apart [m/s].
+_PARTING_SPEED = 0.1
 # Cells beyond this index mean that the world has diverged: it has no contacts any more.
 _LAST_CELL = 1e6
 
@@ -101,6 +106,7 @@ def _offset(neighbour, k):
 def _list_pairs(work, model, lane, reach, grid, pairs):
     particles = model.collision_particles
     zero = work.dtype.type(0)
+    rest, apart = model.positions, model.collision_distance[0] * work.dtype.type(_NEIGHBOURHOOD)
     found = 0
     for index in range(particles.shape[0]):
         particle = particles[index]
@@ -108,15 +114,28 @@ def _list_pairs(work, model, lane, reach, grid, pairs):
             bucket = _bucket(grid, index, neighbour, grid.shape[1] - 1)
             for entry in range(grid[0, bucket], grid[0, bucket + 1]):
                 other = grid[1, entry]
-                if other > index and _in_cell(grid, index, other, neighbour):
+                if (
+                    other > index
+                    and _in_cell(grid, index, other, neighbour)
+                    and _far_at_rest(rest, particle, particles[other], apart)
+                ):
                     other_particle = particles[other]
                     a, b = row(work, particle), row(work, other_particle)
-                    square = _square_distance(a, b, lane, zero)
+                    square = _square_distance(a, b, POSITION, lane, zero)
                     if square < reach * reach and found < pairs.shape[0]:
                         pairs[found, 0] = particle
                         pairs[found, 1] = other_particle
                         found += 1
     return found
+
+
+@kernel
+def _far_at_rest(rest, i, j, apart):
+    """Tell whether two particles were built at least `apart` from each other."""
+    square = rest[i, 0] * 0
+    for k in range(DIM):
+        square += (rest[i, k] - rest[j, k]) * (rest[i, k] - rest[j, k])
+    return square >= apart * apart
 
 
 @kernel
@@ -129,30 +148,37 @@ def _in_cell(grid, index, other, neighbour):
 
 
 @kernel
-def _square_distance(a, b, lane, zero):
+def _square_distance(a, b, quantity, lane, zero):
     square = zero
     for k in range(DIM):
-        delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+        delta = a[quantity + k * LANES + lane] - b[quantity + k * LANES + lane]
         square += delta * delta
     return square
 
 
 @kernel
-def collide_with_self(work, model, pairs, counts):
-    """Push the listed pairs apart to the collision distance, with friction between them."""
+def collide_with_self(work, model, pairs, counts, h):
+    """Push the listed pairs apart to the collision distance, with friction between them.
+
+    A pair that began the substep closer than that is let apart at `_PARTING_SPEED` only (Macklin et
+    al. 2019, eq. 10): pushed out at once, it would fly apart at depth/h, and folds that lie through
+    each other would never come to rest.
+    """
     zero, one = work.dtype.type(0), work.dtype.type(1)
     inverse_mass = model.inverse_mass
     distance = model.collision_distance[0]
     friction = model.contact[2]
+    parting = work.dtype.type(_PARTING_SPEED) * h
     for lane in range(LANES):
         for index in range(counts[lane]):
             i, j = pairs[lane, index, 0], pairs[lane, index, 1]
             a, b = row(work, i), row(work, j)
-            square = _square_distance(a, b, lane, zero)
+            square = _square_distance(a, b, POSITION, lane, zero)
             total = inverse_mass[i] + inverse_mass[j]
             if zero < square < distance * distance and total > zero:
                 length = np.sqrt(square)
-                depth = distance - length
+                before = np.sqrt(_square_distance(a, b, START, lane, zero))
+                depth = max(min(distance, before + parting) - length, zero)
                 push = depth / (length * total)
                 for k in range(DIM):
                     move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])

@@ -18,23 +18,32 @@ def read_velocities(work, model, inverse_h):
 
 
 @kernel
-def collide_with_walls(work, model, inverse_h, rest_speed):
-    """Put every free particle back into the room and read its velocity off, with restitution.
-
-    rest_speed [m/s]: slower impacts do not bounce, else gravity alone would make resting particles hop.
-    """
+def collide_with_walls(work, model):
+    """Put every free particle back into the room, with friction."""
     inverse_mass, lower_wall, upper_wall = model.inverse_mass, model.lower, model.upper
-    radius, restitution, friction = model.contact[0], model.contact[1], model.contact[2]
+    radius, friction = model.contact[0], model.contact[2]
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
             at = row(work, particle)
             for axis in range(DIM):
-                lower = lower_wall[axis] + radius
-                upper = upper_wall[axis] - radius
+                lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
                 _stop_at_walls(at, axis, lower, upper, friction)
+
+
+@kernel
+def read_velocities_in_room(work, model, inverse_h, rest_speed):
+    """Read the velocities off; at a wall, with restitution.
+
+    rest_speed [m/s]: slower impacts do not bounce, else gravity alone would make resting particles
+    hop.
+    """
+    inverse_mass, lower_wall, upper_wall = model.inverse_mass, model.lower, model.upper
+    radius, restitution = model.contact[0], model.contact[1]
+    for particle in range(inverse_mass.shape[0]):
+        if inverse_mass[particle] > 0:
+            at = row(work, particle)
             for axis in range(DIM):
-                lower = lower_wall[axis] + radius
-                upper = upper_wall[axis] - radius
+                lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
                 _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h)
 
 
@@ -66,11 +75,13 @@ def _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h):
     """Read the velocity of one axis; at a wall it is the restituted one (Mueller et al. 2020, eq. 34).
 
     The speed before the impact is the predicted one, gravity's kick included. Setting the outward
-    velocity instead of reading it off also lets overlapping particles out without a launch.
+    velocity instead of reading it off also lets overlapping particles out without a launch. What was
+    moved since the contacts is put back behind the wall.
     """
     zero = type(restitution)(0)
     for lane in range(LANES):
-        position = at[POSITION + axis * LANES + lane]
+        position = min(max(at[POSITION + axis * LANES + lane], lower), upper)
+        at[POSITION + axis * LANES + lane] = position
         impact = at[VELOCITY + axis * LANES + lane]
         speed = (position - at[START + axis * LANES + lane]) * inverse_h
         rebound = -restitution * impact if abs(impact) > rest_speed else zero

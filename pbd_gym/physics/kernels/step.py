@@ -3,9 +3,9 @@
 import numpy as np
 
 from ..compiling import kernel, row
-from .chain import project_chain_velocities, project_chains, project_chains_from_start
+from .chain import limit_strains, project_chain_velocities, project_chains, project_chains_from_start
 from .collision import collide_with_self, find_pairs
-from .contact import collide_with_walls, read_velocities
+from .contact import collide_with_walls, read_velocities, read_velocities_in_room
 from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
 from .sweep import (
     project_bends,
@@ -130,14 +130,14 @@ def _project(work, model, collision, timing, second_order):
     for iteration in range(model.iterations):
         if iteration == 0:
             project_bends(work, model, timing[3])
+            if collision is not None:
+                collide_with_self(work, model, collision[1], collision[2], timing[1])
         if second_order is not None:
             project_distances_from_start(work, model, timing[3], iteration)
             project_chains_from_start(work, model, timing[3], iteration)
         else:
             project_distances(work, model, timing[3], iteration)
             project_chains(work, model, timing[3], iteration)
-    if collision is not None:
-        collide_with_self(work, model, collision[1], collision[2])
 
 
 @kernel
@@ -147,7 +147,10 @@ def _finish(work, model, timing, second_order):
     for k in range(DIM):
         walls |= model.lower[k] > -np.inf or model.upper[k] < np.inf
     if walls:
-        collide_with_walls(work, model, timing[2], timing[5])
+        collide_with_walls(work, model)
+    limit_strains(work, model)
+    if walls:
+        read_velocities_in_room(work, model, timing[2], timing[5])
     else:
         read_velocities(work, model, timing[2])
     if second_order is not None:
