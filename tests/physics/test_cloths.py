@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 from scenes import cloth_3d, momenta, strain, world
 
+from pbd_gym.physics import ModelBuilder
+
 
 def closest(state):
     """Smallest distance of two particles [m]."""
@@ -51,8 +53,8 @@ def test_particles_of_a_cloth_keep_their_distance():
         lift = 0.1 * np.sin(np.pi * share) - 0.25 * share
         state.step(1 / 30, 20, targets=start + share * np.array([0.26, 0.0, 0.0]) + [0, 0, lift])
         low = min(low, closest(state) - distance)
-    # contacts are solved after the threads, one sweep per substep: pairs in a pile push each other
-    # back by a part of their depth; a fifth of the distance is what the weave cannot pass through
+    # contacts give way to threads that pull, and overlaps part at a tenth of a metre per second: a
+    # fold may sink in by a fifth, which leaves more than the weave could pass through
     assert low > -0.2 * distance
     assert state.x[0, :, 2].min() >= 0.004 - 1e-12
 
@@ -67,15 +69,36 @@ def test_a_cloth_laid_flat_on_the_table_lies_still():
 
 
 def test_two_particles_that_fly_at_each_other_do_not_pass():
-    state = world(cloth_3d((2, 2), gravity=(0, 0, 0), ground=False, damping=0.0))
-    # opposite corners are shot at each other within the plane, at a tenth of a distance per substep
-    centre = state.x[0].mean(axis=0)
-    state.v[0] = (centre - state.x[0]) / 0.028 * 2.0
+    distance = 0.024
+    builder = ModelBuilder(3)
+    builder.add_particles([(0.0, 0.0, 0.0), (1.0, 0.001, 0.0)], 0.1)
+    builder.set_self_collision([0, 1], distance)
+    state = world(builder.build(gravity=(0, 0, 0)))
+    state.v[0, :, 0] = (1.0, -1.0)
     smallest = np.inf
-    for _ in range(60):
+    for _ in range(40):
         state.step(1 / 30, 20)
         smallest = min(smallest, closest(state))
-    assert smallest > 0.8 * 0.6 * 0.04
+    # a pair alone is set exactly to the distance in the substep in which it meets
+    assert smallest > distance * (1.0 - 1e-9)
+    assert state.x[0, 0, 0] < state.x[0, 1, 0]
+    momentum, _ = momenta(state)
+    np.testing.assert_allclose(momentum, 0.0, atol=1e-12)  # rounding of 1e-16 m / 1.7e-3 s
+
+
+def test_a_strain_limit_cuts_links_short():
+    builder = ModelBuilder(3)
+    builder.add_particles((0.0, 0.0, 0.0), 1.0, pinned=True)
+    builder.add_particles((0.0, 0.0, -1.0), 1.0)
+    builder.add_chain([0, 1], compliance=0.01, strain_limit=0.02)
+    # the distance of self-collision only chooses the kernels that the other tests use
+    builder.set_self_collision([0, 1], 0.01)
+    state = world(builder.build(damping=2.0))
+    for _ in range(120):
+        state.step(1 / 30, 20)
+        assert strain(state) < 0.02 + 1e-12
+    # without the limit, the weight of 9.81 N would stretch it by 9.8 cm
+    assert strain(state) == pytest.approx(0.02, abs=1e-12)
 
 
 @pytest.mark.parametrize("spread", [0.0, 1e-9])

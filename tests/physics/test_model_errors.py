@@ -157,6 +157,16 @@ def test_a_compliance_is_finite_and_not_negative(compliance):
     refused(builder, f"compliance of bend 0 is {compliance}")
 
 
+@pytest.mark.parametrize("limit", [-0.01, NAN])
+def test_a_strain_limit_is_not_negative(limit):
+    builder = line()
+    builder.add_chain([0, 1, 2])
+    builder.add_chain([2, 3], strain_limit=limit)
+    refused(
+        builder, f"greatest length of chain entry 3 is {1.0 + limit}; a strain limit is at least 0"
+    )
+
+
 @pytest.mark.parametrize("stiffness", [0.0, -0.5, 1.0001, NAN])
 def test_the_seeds_stiffness_is_a_share(stiffness):
     builder = line()

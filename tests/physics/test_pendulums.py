@@ -36,8 +36,8 @@ def test_a_pendulum_has_the_period_of_the_elliptic_integral(degrees):
     angle = np.radians(degrees)
     exact = 4.0 * np.sqrt(1.0 / GRAVITY) * ellipk(np.sin(angle / 2.0) ** 2)
     period = measured_period(swung([angle]), swings=3)
-    # second order: |dT|/T of the order of (omega h)^2 = 9.81 * 0.002^2 = 4e-5; Verlet has a third of
-    # it at most (1/24 for small swings)
+    # second order: |dT|/T of the order of (omega h)^2 = 9.81 * 0.002^2 = 4e-5; Verlet has
+    # 1/24 of it for small swings and less than a third for all
     assert period == pytest.approx(exact, rel=1.3e-5)
 
 
