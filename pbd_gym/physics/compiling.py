@@ -88,6 +88,16 @@ def load_kernels(dim: int, lanes: int) -> ModuleType:
     return importlib.import_module(f"{name}.step")
 
 
+def loaded_lanes(dim: int) -> int | None:
+    """Return the lanes of kernels that are loaded already, None if there are none.
+
+    A world that is needed once (to let a body settle) takes these and compiles nothing more.
+    """
+    prefix = f"{__package__}.kernels_{dim}d_"
+    lanes = [name[len(prefix) :] for name in sys.modules if name.startswith(prefix)]
+    return min((int(text) for text in lanes if text.isdigit()), default=None)
+
+
 @functools.cache
 def cache_folder() -> Path | None:
     """Return the folder of compiled kernels: the first that can be written; None if none can.

@@ -18,6 +18,7 @@ _FARTHEST = 3.0
 _NEIGHBOURHOOD = 3.0
 # Speed at which overlapping particles are let apart [m/s].
 _PARTING_SPEED = 0.1
+_DRAG = 0.1
 # Cells beyond this index mean that the world has diverged: it has no contacts any more.
 _LAST_CELL = 1e6
 
@@ -164,7 +165,7 @@ def collide_with_self(work, model, pairs, counts, h):
     al. 2019, eq. 10): pushed out at once, it would fly apart at depth/h, and folds that lie through
     each other would never come to rest.
     """
-    zero, one = work.dtype.type(0), work.dtype.type(1)
+    zero = work.dtype.type(0)
     inverse_mass = model.inverse_mass
     distance = model.collision_distance[0]
     friction = model.contact[2]
@@ -184,28 +185,15 @@ def collide_with_self(work, model, pairs, counts, h):
                     move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
                     a[POSITION + k * LANES + lane] += inverse_mass[i] * move
                     b[POSITION + k * LANES + lane] -= inverse_mass[j] * move
-                _rub(a, b, lane, inverse_mass[i], inverse_mass[j], friction * depth, one)
+                _drag(a, b, lane, inverse_mass[i], inverse_mass[j])
 
 
 @kernel
-def _rub(a, b, lane, mass_a, mass_b, held, one):
-    """Coulomb friction of a touching pair: hold back its tangential slide of this substep."""
-    zero = type(held)(0)
-    normal_slide, square, gap = zero, zero, zero
+def _drag(a, b, lane, mass_a, mass_b):
+    """Take a share of a touching pair's relative motion of this substep back."""
+    share = type(mass_a)(_DRAG) / (mass_a + mass_b)
     for k in range(DIM):
         at = k * LANES + lane
-        normal = a[POSITION + at] - b[POSITION + at]
-        slide = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
-        normal_slide += slide * normal
-        square += slide * slide
-        gap += normal * normal
-    along = normal_slide / gap if gap > zero else zero
-    tangential = np.sqrt(max(square - along * normal_slide, zero))
-    share = min(held / tangential, one) / (mass_a + mass_b) if tangential > zero else zero
-    for k in range(DIM):
-        at = k * LANES + lane
-        normal = a[POSITION + at] - b[POSITION + at]
-        slide = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
-        move = share * (slide - along * normal)
-        a[POSITION + at] -= mass_a * move
-        b[POSITION + at] += mass_b * move
+        motion = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
+        a[POSITION + at] -= mass_a * share * motion
+        b[POSITION + at] += mass_b * share * motion

@@ -125,11 +125,15 @@ def _distance_velocity(a, b, mass_a, mass_b):
 
 
 @kernel
-def project_bends(work, model, inverse_h2):
-    """Draw x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta."""
+def project_bends(work, model, h, inverse_h2):
+    """Draw C = x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta.
+
+    With a dashpot of b [N s/m] beside the spring (Macklin et al. 2016, eq. 26, gamma = alpha b/h), which is
+    what lets a crumpled cloth come to rest.
+    """
     inverse_mass, triples = model.inverse_mass, model.bend_triples
-    bend_compliance = model.bend_compliance
-    for index in range(bend_compliance.shape[0]):
+    compliance, damping = model.bend_compliance, model.bend_damping
+    for index in range(triples.shape[0]):
         i, j, k = triples[index, 0], triples[index, 1], triples[index, 2]
         _bend(
             row(work, i),
@@ -138,20 +142,23 @@ def project_bends(work, model, inverse_h2):
             inverse_mass[i],
             inverse_mass[j],
             inverse_mass[k],
-            bend_compliance[index] * inverse_h2,
+            compliance[index] * inverse_h2,
+            compliance[index] * damping[index] / h,
         )
 
 
 @kernel
-def _bend(a, b, c, mass_a, mass_b, mass_c, alpha):
+def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, gamma):
     real = type(mass_a)
     one, two, four, zero = real(1), real(2), real(4), real(0)
-    total = mass_a + four * mass_b + mass_c + alpha
+    total = (one + gamma) * (mass_a + four * mass_b + mass_c) + alpha
     share = one / total if total > zero else zero
     for lane in range(LANES):
         for k in range(DIM):
-            at = POSITION + k * LANES + lane
-            move = share * (a[at] - two * b[at] + c[at])
+            at, start = POSITION + k * LANES + lane, START + k * LANES + lane
+            bent = a[at] - two * b[at] + c[at]
+            change = bent - (a[start] - two * b[start] + c[start])
+            move = share * (bent + gamma * change)
             a[at] -= mass_a * move
             b[at] += two * mass_b * move
             c[at] -= mass_c * move

@@ -1,0 +1,259 @@
+"""A cloth held by two corners above a table: lay it flat on a square."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from pbd_gym.physics import Model, ModelBuilder, World, shapes
+from pbd_gym.physics.compiling import loaded_lanes
+from pbd_gym.physics.portable import cos_sin
+from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, length, mean, number
+from pbd_gym.tasks.rewards import closeness
+
+_PI = 3.141592653589793
+# Distance that particles keep from the table [m].
+_TABLE_GAP = 0.005
+# Pins are held at most this share of the cloth's side apart: a taut edge would fight with gravity.
+_SPAN = 0.97
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloth(Task):
+    """A cloth hangs by two corners above a table; it must be laid flat on a square.
+
+    ## Description
+    A cloth of 12 x 12 particles, 0.6 m wide, hangs from two grippers at the corners of one edge. The agent
+    moves both grippers and has to lay the cloth on a drawn square of the table: free edge first,
+    then down and back. The threads are solved directly, the cloth collides with itself and with the
+    table, with friction.
+
+    ## Action Space
+    `Box(-1, 1, (6,), float32)`: desired velocities x, y, z of the first, then of the second gripper,
+    in units of `max_speed` (1 m/s). The grippers' velocities follow with at most `max_acceleration`
+    (10 m/s2) along each axis, brake before the edges of the workspace (x, y in [-0.8, 0.8] m, z up
+    to 1 m) and stay within 0.97 of the cloth's side of each other. Actions beyond [-1, 1] are clipped.
+
+    ## Observation Space
+    `Box(-10, 10, (6 N + 4,), float32)` for N observed particles (144, or 9 with
+    `observation="keypoints"`: corners, middles of the edges, centre): positions relative to the
+    square's centre in the square's axes [m / 0.5 m] (3 N), velocities in the same axes [m/s] (3 N), the
+    square's centre [m] (2) and the cosine and sine of its yaw (2).
+
+    ## Rewards
+    exp(-5 m / side) in [0, 1] for the mean distance m of all particles from their places on the square.
+
+    ## Starting State
+    The cloth hangs at rest. The grippers' middle is drawn from x, y in [-0.15, 0.15] m, their
+    height from [0.65, 0.75] m and the yaw of the line between them from [-0.5, 0.5] rad; so are the
+    centre and the yaw of the square.
+
+    ## Episode End
+    Truncated after 90 steps. Success: normalized performance > 0.9 at the end, that is a mean
+    distance below a tenth of that at the start. Terminated only if the simulation diverges, which
+    does not happen with the defaults.
+
+    ## Arguments
+    ```python
+    >>> import gymnasium
+    >>> env = gymnasium.make("pbd_gym:PBDCloth-v0", observation="keypoints", friction=0.8)
+    >>> observation, info = env.reset(seed=1, options={"goal": [0.1, 0.0], "goal_yaw": 0.3})
+
+    ```
+    Every field of the class is a keyword. `reset` takes the options `middle` (x, y) [m], `height`
+    [m], `yaw` [rad], `goal` (x, y) [m] and `goal_yaw` [rad].
+
+    ## Version History
+    * v0: first version
+    """
+
+    particles: int = number(12, 4, 40)  # type: ignore[assignment]
+    side: float = number(0.6, 0.1, 0.6, "m")
+    mass: float = number(0.15, 1e-3, 1e2, "kg")
+    stretch_compliance: float = number(1e-4, 0.0, 1.0, "m/N")
+    shear_compliance: float = number(0.1, 0.0, 1e3, "m/N")
+    bending_compliance: float = number(10.0, 0.0, 1e6, "m/N")
+    bending_damping: float = number(0.03, 0.0, 1e3, "N s/m")
+    friction: float = number(0.5, 0.0, 10.0)
+    substeps: int = number(16, 1, 1000)  # type: ignore[assignment]
+    max_speed: float = number(1.0, 1e-3, 100.0, "m/s")
+    max_acceleration: float = number(10.0, 1e-3, 1000.0, "m/s2")
+    damping: float = number(1.0, 0.0, 100.0, "1/s")
+
+    action_axes: ClassVar[tuple[int, ...]] = (0, 1, 2)
+
+    def build(self) -> Model:
+        """Build the cloth, hanging flat; row 0 is the held edge."""
+        builder = ModelBuilder(3)
+        spacing = self.side / (self.particles - 1)
+        grid = shapes.cloth(
+            builder,
+            (-0.5 * self.side, 0.0, self.side + 0.1),
+            (0.0, 0.0, -self.side),
+            (self.side, 0.0, 0.0),
+            (self.particles, self.particles),
+            mass=self.mass,
+            stretch_compliance=self.stretch_compliance,
+            shear_compliance=self.shear_compliance,
+            bending_compliance=self.bending_compliance,
+            bending_damping=self.bending_damping,
+            strain_limit=0.01,
+            collision_distance=0.7 * spacing,
+        )
+        builder.pin([grid[0, 0], grid[0, -1]])
+        builder.set_ground(0.0, friction=self.friction, radius=_TABLE_GAP)
+        return builder.build(gravity=(0.0, 0.0, -self.gravity), damping=self.damping)
+
+    def workspace(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners of the grippers' workspace."""
+        return np.array([-0.8, -0.8, _TABLE_GAP]), np.array([0.8, 0.8, 1.0])
+
+    def span(self) -> float:
+        """Return how far apart the grippers may be."""
+        return _SPAN * self.side
+
+    @property
+    def view(self) -> tuple[np.ndarray, np.ndarray]:
+        """The part of the workspace in which the task takes place."""
+        return np.array([-0.6, -0.6, 0.0]), np.array([0.6, 0.6, 0.8])
+
+    def declare_draws(self) -> dict[str, Draw]:
+        """Draw where the cloth hangs and where it shall lie."""
+        near, far = np.full(2, 0.15), np.full(2, 0.4)
+        return {
+            "middle": draw(-near, near, -far, far),
+            "height": draw(0.65, 0.75, self.side + 0.02, 1.0),
+            "yaw": draw(-0.5, 0.5, -_PI, _PI),
+            "goal": draw(-near, near, -far, far),
+            "goal_yaw": draw(-0.5, 0.5, -_PI, _PI),
+        }
+
+    @cached_property
+    def _hanging(self) -> np.ndarray:
+        """Positions of the cloth at rest below its grippers, whose middle is the origin, (N, 3)."""
+        world = World(self.model, 1, lanes=loaded_lanes(3))
+        pins = self.model.pins
+        grippers = world.x[:, pins].copy()
+        grippers[:, :, 0] *= np.float32(_SPAN)
+        for _ in range(round(4.0 * self.control_rate)):
+            world.step(1.0 / self.control_rate, self.substeps, grippers)
+        x = world.x[0]
+        return x - np.float32(0.5) * (x[pins[0]] + x[pins[1]])
+
+    @cached_property
+    def _square(self) -> np.ndarray:
+        """Places of the particles on a square around the origin, (N, 2): row 0 at +y."""
+        line = np.linspace(-0.5 * self.side, 0.5 * self.side, self.particles)
+        across, along = np.meshgrid(line, -line)
+        return np.stack([across.ravel(), along.ravel()], axis=1)
+
+    def start(self, quantities: dict[str, np.ndarray]) -> Start:
+        """Hang the cloth at rest at its place, turned by its yaw."""
+        turned = _turn(self._hanging[None].astype(np.float64), quantities["yaw"])
+        place = np.concatenate([quantities["middle"], quantities["height"]], axis=1)
+        x = (turned + place[:, None]).astype(np.float32)
+        cosine, sine = cos_sin(quantities["goal_yaw"])
+        variables = {
+            "goal": quantities["goal"].astype(np.float32),
+            "goal_axis": np.concatenate([cosine, sine], axis=1).astype(np.float32),
+        }
+        return Start(x, np.zeros_like(x), variables)
+
+    def _in_square(self, vectors: np.ndarray, axis: np.ndarray) -> np.ndarray:
+        """Return vectors (n, k, 3) in the axes of the goal squares (n, 2)."""
+        cosine, sine = axis[:, :1], axis[:, 1:]
+        turned = np.empty_like(vectors)
+        turned[:, :, 0] = vectors[:, :, 0] * cosine + vectors[:, :, 1] * sine
+        turned[:, :, 1] = vectors[:, :, 1] * cosine - vectors[:, :, 0] * sine
+        turned[:, :, 2] = vectors[:, :, 2]
+        return turned
+
+    def _relative(self, x: np.ndarray, variables: Variables) -> np.ndarray:
+        """Return positions (n, k, 3) relative to the squares' centres, in the squares' axes [m]."""
+        shifted = x.copy()
+        shifted[:, :, :2] -= variables["goal"][:, None]
+        return self._in_square(shifted, variables["goal_axis"])
+
+    @cached_property
+    def _observed(self) -> np.ndarray:
+        """Indices of the observed particles."""
+        count = self.particles if self.observation == "particles" else 3
+        line = np.round(np.linspace(0, self.particles - 1, count)).astype(np.int64)
+        return (line[:, None] * self.particles + line).ravel()
+
+    def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
+        """Return positions and velocities in the square's axes, and the square."""
+        worlds, real = len(x), x.dtype.type
+        places = self._relative(x[:, self._observed], variables)
+        motion = self._in_square(v[:, self._observed], variables["goal_axis"])
+        return np.concatenate(
+            [
+                (places * real(2.0)).reshape(worlds, -1),
+                motion.reshape(worlds, -1),
+                variables["goal"],
+                variables["goal_axis"],
+            ],
+            axis=1,
+        )
+
+    def judge(
+        self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
+    ) -> Judgement:
+        """Judge by the mean distance of the particles from their places."""
+        places = self._relative(x, variables)
+        places[:, :, :2] -= self._square.astype(x.dtype)
+        places[:, :, 2] -= x.dtype.type(_TABLE_GAP)
+        distance = mean(length(places)).astype(np.float64)
+        reward = closeness(distance, 0.2 * self.side)
+        if "start_performance" in variables:
+            reached = distance < -0.1 * variables["start_performance"]
+        else:
+            reached = np.zeros(len(x), dtype=bool)
+        return Judgement(reward, reached, -distance, {"distance": distance})
+
+    def goal(self, variables: Variables, world: int) -> np.ndarray:
+        """Every particle has its place on the square."""
+        cosine, sine = variables["goal_axis"][world].astype(np.float64)
+        across, along = self._square[:, 0], self._square[:, 1]
+        turned = np.stack([across * cosine - along * sine, across * sine + along * cosine], axis=1)
+        height = np.full((len(turned), 1), _TABLE_GAP)
+        return np.concatenate([turned + variables["goal"][world], height], axis=1)
+
+    def scripted(self, observation: np.ndarray) -> np.ndarray:
+        """Put the free edge down at its place, then lower the held edge while moving it back."""
+        count = len(self._observed)
+        line = round(count**0.5)
+        places = observation[:, : 3 * count].reshape(-1, line, line, 3).astype(np.float64) * 0.5
+        cosine, sine = observation[:, -2:-1], observation[:, -1:]
+        grippers = places[:, 0, [0, -1]]
+        half = 0.5 * self.side
+        free = places[:, -1, :, :].mean(axis=1)
+        # the height of the grippers says how much of the cloth may already lie on the table
+        height = grippers[:, :, 2].mean(axis=1)
+        lying = np.sqrt(np.maximum(self.side**2 - np.minimum(height, self.side) ** 2, 0.0))
+        target = np.empty_like(grippers)
+        target[:, 0, 0], target[:, 1, 0] = -_SPAN * half, _SPAN * half
+        target[:, :, 1] = (lying - half)[:, None] + 0.03
+        aligned = (np.abs(grippers - target)[:, :, :2].max(axis=(1, 2)) < 0.05) & (
+            np.abs(free[:, 1] + half) < 0.12
+        )
+        down = np.where(aligned | (height < 0.9 * self.side), -0.5, -0.05)
+        velocity = 3.0 * (target - grippers)
+        velocity[:, :, 2] = np.maximum(down, 3.0 * (_TABLE_GAP - height))[:, None]
+        world = np.empty_like(velocity)
+        world[:, :, 0] = velocity[:, :, 0] * cosine - velocity[:, :, 1] * sine
+        world[:, :, 1] = velocity[:, :, 0] * sine + velocity[:, :, 1] * cosine
+        world[:, :, 2] = velocity[:, :, 2]
+        return np.clip(world.reshape(-1, 6) / self.max_speed, -1.0, 1.0).astype(np.float32)
+
+
+def _turn(points: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Turn points (1, k, 3) about the vertical by yaws (n, 1) [rad]; return (n, k, 3)."""
+    cosine, sine = cos_sin(yaw)
+    across = points[:, :, 0] * cosine - points[:, :, 1] * sine
+    along = points[:, :, 0] * sine + points[:, :, 1] * cosine
+    up = np.broadcast_to(points[:, :, 2], across.shape)
+    return np.stack([across, along, up], axis=2)
