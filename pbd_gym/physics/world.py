@@ -133,10 +133,9 @@ class World:
         if not self.model.collision_distance:
             return work, None
         colliding = len(self.model.collision_particles)
-        buckets = 1 << (2 * colliding - 1).bit_length()
-        grid = np.zeros((4 + self.model.dim, buckets + 1), dtype=np.int64)
+        reaches = np.zeros((1, self.lanes), dtype=self.dtype)
         pairs = np.zeros((self.lanes, _PAIRS_PER_PARTICLE * colliding, 2), dtype=np.int32)
-        return work, (grid, pairs, np.zeros(self.lanes, dtype=np.int64))
+        return work, (reaches, pairs, np.zeros(self.lanes, dtype=np.int64))
 
     def __getstate__(self) -> dict[str, Any]:
         kept = ("model", "num_worlds", "dtype", "num_threads", "lanes", "x", "v")

@@ -23,7 +23,7 @@ from pbd_gym.rendering.scene import (
 from pbd_gym.rendering.shadow import shadow_patches
 from pbd_gym.rendering.weave import weave
 
-_MARGIN = 0.06
+_MARGIN = 0.03
 _AZIMUTH, _ELEVATION = float(np.radians(-62.0)), float(np.radians(32.0))
 _LIGHT = np.array([-0.45, -0.35, 1.0]) / np.linalg.norm([-0.45, -0.35, 1.0])  # towards the lamp
 _SOLID = (palette.BLUE, palette.DARK_BLUE)  # fill and edge of what is there
@@ -94,7 +94,7 @@ class SpatialPainter:
         fill, edge = _GHOSTLY if ghost else _SOLID
         if isinstance(body, Sheet):
             pieces = 1 if ghost else max(1, round(_PATCHES / max(points.shape[:2])))
-            sides = (fill, fill) if ghost else (palette.CLOTH_BLUE, palette.PALE_BLUE)
+            sides = (fill, fill) if ghost else (palette.PALE_BLUE, palette.CLOTH_BLUE)
             scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides))
             return
         if isinstance(body, Linkage):

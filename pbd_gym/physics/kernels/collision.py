@@ -1,8 +1,8 @@
 """Self-collision: particles of one body keep their distance.
 
-Every world has contacts of its own, so this part runs world by world. Pairs that may meet are
-found once per control step with a hashed grid (linear in particles), contacts are solved in every
-substep, in the order in which they were found.
+Pairs that may meet are found once per control step by comparing all with all, in vector registers:
+up to some thousand particles that is quicker than a grid, whose cells differ from world to world.
+Contacts are solved in every substep, world by world, in the order in which they were found.
 """
 
 import numpy as np
@@ -18,23 +18,32 @@ _FARTHEST = 3.0
 _NEIGHBOURHOOD = 3.0
 # Speed at which overlapping particles are let apart [m/s].
 _PARTING_SPEED = 0.1
+# Share of a touching pair's relative motion that is lost in a substep.
 _DRAG = 0.1
-# Cells beyond this index mean that the world has diverged: it has no contacts any more.
-_LAST_CELL = 1e6
 
 
 @kernel
-def find_pairs(work, model, grid, pairs, counts, dt):
+def find_pairs(work, model, reaches, pairs, counts, dt):
     """List, for every lane, the pairs that can come into contact within the control step.
 
-    grid: (4 + DIM, size) integers of scratch; pairs: (LANES, capacity, 2); counts: (LANES,). What exceeds
-    the capacity is left out (the capacity is several times what a crumpled cloth needs).
+    reaches: (1, LANES) scratch; pairs: (LANES, capacity, 2); counts: (LANES,). What exceeds the
+    capacity is left out (the capacity is several times what a crumpled cloth needs).
     """
+    particles, rest, zero = model.collision_particles, model.positions, work.dtype.type(0)
+    apart = model.collision_distance[0] * work.dtype.type(_NEIGHBOURHOOD)
+    square_reach = row(reaches, 0)
     for lane in range(LANES):
         counts[lane] = 0
         reach = _reach(work, model, lane, dt)
-        if _sort_into_cells(work, model, lane, reach, grid):
-            counts[lane] = _list_pairs(work, model, lane, reach, grid, pairs[lane])
+        square_reach[lane] = reach * reach
+    for first in range(particles.shape[0]):
+        a = row(work, particles[first])
+        for second in range(first + 1, particles.shape[0]):
+            b = row(work, particles[second])
+            if _count_near(a, b, square_reach, zero) > 0:
+                i, j = particles[first], particles[second]
+                if _far_at_rest(rest, i, j, apart):
+                    _list_pair(a, b, i, j, square_reach, pairs, counts, zero)
 
 
 @kernel
@@ -54,98 +63,36 @@ def _reach(work, model, lane, dt):
 
 
 @kernel
-def _sort_into_cells(work, model, lane, reach, grid):
-    """Counting sort of the particles by hashed cell; False where a position is out of all bounds.
-
-    Rows of grid: 0 first entry of a bucket, 1 sorted particles, 2 bucket of a particle, 3 fill
-    marks, 4... cell coordinates of a particle.
-    """
-    particles = model.collision_particles
-    count = particles.shape[0]
-    buckets = grid.shape[1] - 1
-    limit = work.dtype.type(_LAST_CELL)
-    for bucket in range(buckets + 1):
-        grid[0, bucket] = 0
-    for index in range(count):
-        at = row(work, particles[index])
+def _count_near(a, b, square_reach, zero):
+    """Count the lanes in which two particles are within reach."""
+    near = 0
+    for lane in range(LANES):
+        square = zero
         for k in range(DIM):
-            cell = np.floor(at[POSITION + k * LANES + lane] / reach)
-            if not abs(cell) < limit:
-                return False
-            grid[4 + k, index] = np.int64(cell)
-        bucket = _bucket(grid, index, 0, buckets)
-        grid[2, index] = bucket
-        grid[0, bucket + 1] += 1
-    for bucket in range(buckets):
-        grid[0, bucket + 1] += grid[0, bucket]
-        grid[3, bucket] = grid[0, bucket]
-    for index in range(count):
-        bucket = grid[2, index]
-        grid[1, grid[3, bucket]] = index
-        grid[3, bucket] += 1
-    return True
-
-
-@kernel
-def _bucket(grid, index, neighbour, buckets):
-    """Return the bucket of a neighbour (0 is the own cell) of a particle's cell."""
-    key = np.int64(0)
-    for k in range(DIM):
-        key = (key * 73856093) ^ ((grid[4 + k, index] + _offset(neighbour, k)) * 19349663)
-    return (key ^ (key >> 17)) & (buckets - 1)
-
-
-@kernel
-def _offset(neighbour, k):
-    """Return -1, 0 or 1: neighbour counts through all 3^DIM cells around, starting at the own."""
-    for _ in range(k):
-        neighbour //= 3
-    return (neighbour + 1) % 3 - 1
-
-
-@kernel
-def _list_pairs(work, model, lane, reach, grid, pairs):
-    particles = model.collision_particles
-    zero = work.dtype.type(0)
-    rest, apart = model.positions, model.collision_distance[0] * work.dtype.type(_NEIGHBOURHOOD)
-    found = 0
-    for index in range(particles.shape[0]):
-        particle = particles[index]
-        for neighbour in range(3**DIM):
-            bucket = _bucket(grid, index, neighbour, grid.shape[1] - 1)
-            for entry in range(grid[0, bucket], grid[0, bucket + 1]):
-                other = grid[1, entry]
-                if (
-                    other > index
-                    and _in_cell(grid, index, other, neighbour)
-                    and _far_at_rest(rest, particle, particles[other], apart)
-                ):
-                    other_particle = particles[other]
-                    a, b = row(work, particle), row(work, other_particle)
-                    square = _square_distance(a, b, POSITION, lane, zero)
-                    if square < reach * reach and found < pairs.shape[0]:
-                        pairs[found, 0] = particle
-                        pairs[found, 1] = other_particle
-                        found += 1
-    return found
+            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
+            square += delta * delta
+        near += 1 if square < square_reach[lane] else 0
+    return near
 
 
 @kernel
 def _far_at_rest(rest, i, j, apart):
     """Tell whether two particles were built at least `apart` from each other."""
-    square = rest[i, 0] * 0
+    square = apart * 0
     for k in range(DIM):
         square += (rest[i, k] - rest[j, k]) * (rest[i, k] - rest[j, k])
     return square >= apart * apart
 
 
 @kernel
-def _in_cell(grid, index, other, neighbour):
-    """Tell whether the other particle is in this very neighbour cell, not one of equal hash."""
-    same = True
-    for k in range(DIM):
-        same &= grid[4 + k, other] == grid[4 + k, index] + _offset(neighbour, k)
-    return same
+def _list_pair(a, b, i, j, square_reach, pairs, counts, zero):
+    """Add a pair to the lists of the lanes in which it is within reach."""
+    for lane in range(LANES):
+        near = _square_distance(a, b, POSITION, lane, zero) < square_reach[lane]
+        if near and counts[lane] < pairs.shape[1]:
+            pairs[lane, counts[lane], 0] = i
+            pairs[lane, counts[lane], 1] = j
+            counts[lane] += 1
 
 
 @kernel

@@ -7,17 +7,6 @@ from .layout import DIM, LANES, POSITION, START, VELOCITY
 
 
 @kernel
-def read_velocities(work, model, inverse_h):
-    """Read the velocities off the moved positions, v = (x - x_start)/h: no walls in this world."""
-    inverse_mass = model.inverse_mass
-    for particle in range(inverse_mass.shape[0]):
-        if inverse_mass[particle] > 0:
-            at = row(work, particle)
-            for lane in range(DIM * LANES):
-                at[VELOCITY + lane] = (at[POSITION + lane] - at[START + lane]) * inverse_h
-
-
-@kernel
 def collide_with_walls(work, model):
     """Put every free particle back into the room, with friction."""
     inverse_mass, lower_wall, upper_wall = model.inverse_mass, model.lower, model.upper
@@ -26,13 +15,14 @@ def collide_with_walls(work, model):
         if inverse_mass[particle] > 0:
             at = row(work, particle)
             for axis in range(DIM):
-                lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                _stop_at_walls(at, axis, lower, upper, friction)
+                if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
+                    lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
+                    _stop_at_walls(at, axis, lower, upper, friction)
 
 
 @kernel
-def read_velocities_in_room(work, model, inverse_h, rest_speed):
-    """Read the velocities off; at a wall, with restitution.
+def read_velocities(work, model, inverse_h, rest_speed):
+    """Read the velocities off the moved positions, v = (x - x_start)/h; at a wall, with restitution.
 
     rest_speed [m/s]: slower impacts do not bounce, else gravity alone would make resting particles
     hop.
@@ -43,8 +33,12 @@ def read_velocities_in_room(work, model, inverse_h, rest_speed):
         if inverse_mass[particle] > 0:
             at = row(work, particle)
             for axis in range(DIM):
-                lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h)
+                if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
+                    lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
+                    _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h)
+                else:
+                    for lane in range(axis * LANES, (axis + 1) * LANES):
+                        at[VELOCITY + lane] = (at[POSITION + lane] - at[START + lane]) * inverse_h
 
 
 @kernel

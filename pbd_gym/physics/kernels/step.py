@@ -1,11 +1,9 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
-import numpy as np
-
 from ..compiling import kernel, row
 from .chain import limit_strains, project_chain_velocities, project_chains, project_chains_from_start
 from .collision import collide_with_self, find_pairs
-from .contact import collide_with_walls, read_velocities, read_velocities_in_room
+from .contact import collide_with_walls, read_velocities
 from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
 from .sweep import (
     project_bends,
@@ -27,7 +25,7 @@ def advance(x, v, targets, tiles, work, collision, second_order, model, timing, 
         targets: Where the pins are at the end of the step, (W, P, DIM) [m].
         tiles: First and last + 1 tile of LANES worlds.
         work: Scratch (N + 1, WIDTH); the last row is zero.
-        collision: Scratch of self-collision (grid, candidate pairs, their counts), or None. What is
+        collision: Scratch of self-collision (reaches, candidate pairs, their counts), or None. What is
             None is known when compiling: the code behind it is not compiled at all.
         second_order: True for RATTLE, None for PBD.
         model: The Parameters.
@@ -143,16 +141,9 @@ def _project(work, model, collision, timing, second_order):
 @kernel
 def _finish(work, model, timing, second_order):
     """Step 5: walls, then velocities from positions; second order adds its other half kick."""
-    walls = False
-    for k in range(DIM):
-        walls |= model.lower[k] > -np.inf or model.upper[k] < np.inf
-    if walls:
-        collide_with_walls(work, model)
+    collide_with_walls(work, model)
     limit_strains(work, model)
-    if walls:
-        read_velocities_in_room(work, model, timing[2], timing[5])
-    else:
-        read_velocities(work, model, timing[2])
+    read_velocities(work, model, timing[2], timing[5])
     if second_order is not None:
         half = work.dtype.type(0.5)
         inverse_mass, gravity = model.inverse_mass, model.gravity
