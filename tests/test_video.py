@@ -1,5 +1,9 @@
+import os
 import shutil
+import subprocess
+import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -200,3 +204,22 @@ def test_grids_that_cannot_be_are_refused():
         grid([picture], 0)
     with pytest.raises(ValueError, match="float64"):
         grid([picture.astype(float)])
+
+
+def test_the_example_films_a_policy(tmp_path):
+    root = Path(__file__).parents[1]
+    command = [sys.executable, str(root / "examples/record_video.py"), "--policy", "random"]
+    options = ["--grid", "1x2", "--episodes", "3", "--out", str(tmp_path / "film.mp4")]
+    run = subprocess.run(
+        [*command, *options],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    )
+    assert run.returncode == 0, run.stderr
+    assert "of 4 episodes succeeded" in run.stdout  # three, rounded up to whole grids of two
+    assert "200/200" in run.stderr  # the bar counts two rounds of 100 steps
+    about, played = read(tmp_path / "film.mp4")
+    assert about["size"] == (2 * 512 + 2, 512)
+    assert len(played) == 2 * (100 + 1)  # with the first frame of each round
