@@ -44,6 +44,8 @@ def cloth_3d(shape=(6, 6), *, height=0.3, pins=(), ground=True, **settings) -> M
         (0.0, cell * (columns - 1), 0.0),
         shape,
         mass=0.1,
+        stretch_compliance=1e-6,
+        bending_compliance=0.1,
         collision_distance=0.6 * cell,
     )
     builder.pin([grid[pin] for pin in pins])
