@@ -72,7 +72,9 @@ class _Pictures:
     def draw(self, batch: Batch, world: int) -> np.ndarray:
         """Return a frame of one world, (height, width, 3) uint8."""
         if self.renderer is None:
-            self.renderer = Renderer(self.task.model, self.task.view, size=self.size)
+            self.renderer = Renderer(
+                self.task.model, self.task.view, size=self.size, rails=self.task.rails
+            )
         goal = self.task.goal(batch.variables, world) if batch.variables else None
         return self.renderer.draw(batch.world.x[world], goal, self.task.goal_radius)
 
@@ -374,10 +376,6 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             )
             return None
         return tuple(self._pictures.draw(self._batch, world) for world in range(self.num_envs))
-
-    def close_extras(self, **kwargs: Any) -> None:
-        """Release what draws."""
-        self._pictures.close()
 
     def get_state(self) -> EpisodeState:
         """Return all that the continuation of every world depends on, random generators included."""

@@ -174,6 +174,11 @@ class Task:
         """Tolerance around a goal [m], for the picture."""
         return 0.0
 
+    @property
+    def rails(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Ends of the rails along which pins move, (dim,) each [m], for the picture."""
+        return ()
+
     def span(self) -> float:
         """Return how far apart two pins may be [m]."""
         return np.inf

@@ -111,6 +111,11 @@ class Pendulum(Task):
         reach = 1.15 * self.length
         return np.array([-self.rail - 0.3, -reach]), np.array([self.rail + 0.3, reach])
 
+    @property
+    def rails(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """The rail of the pivot."""
+        return (self.workspace(),)
+
     def declare_draws(self) -> dict[str, Draw]:
         """Draw small angles and rates; the pivot starts in the middle."""
         small, whole = np.full(self.links, 0.1), np.full(self.links, _PI)
