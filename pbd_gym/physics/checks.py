@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+# Beyond this a mass or its inverse would leave the range of float32 in the solver [kg].
+_LEAST_MASS = 1e-12
+
 
 def check_model(
     columns: dict[str, Any],
@@ -36,8 +39,9 @@ def _check_particles(positions: np.ndarray, masses: np.ndarray, pinned: np.ndarr
         raise ValueError("the model has 0 particles; add at least one")
     wrong = ~np.isfinite(positions).all(axis=1)
     _refuse_if(wrong, "position of particle", positions, "coordinates must be finite [m]")
-    wrong = ~(np.isfinite(masses) & (masses > 0.0)) & ~pinned
-    _refuse_if(wrong, "mass of particle", masses, "a mass must be positive and finite [kg]")
+    wrong = ~((masses >= _LEAST_MASS) & (masses <= 1.0 / _LEAST_MASS)) & ~pinned
+    allowed = f"a mass must be positive and finite, from {_LEAST_MASS} to {1.0 / _LEAST_MASS} [kg]"
+    _refuse_if(wrong, "mass of particle", masses, allowed)
 
 
 def _check_settings(settings: dict[str, Any], gravity: np.ndarray, names: tuple[str, ...]) -> None:

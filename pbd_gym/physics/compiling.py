@@ -15,6 +15,7 @@ import importlib.util
 import os
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -26,6 +27,8 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 _KERNELS = Path(__file__).parent / "kernels"
+# two threads that load the same kernels would see each other's half-loaded modules
+_loading = threading.Lock()
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -72,9 +75,14 @@ else:
     row = intrinsic(_row)
 
 
-@functools.cache
 def load_kernels(dim: int, lanes: int) -> ModuleType:
     """Return the kernels' step module for `dim` axes and `lanes` worlds side by side."""
+    with _loading:
+        return _load_kernels(dim, lanes)
+
+
+@functools.cache
+def _load_kernels(dim: int, lanes: int) -> ModuleType:
     name = f"{__package__}.kernels_{dim}d_{lanes}"
     spec = importlib.util.spec_from_file_location(
         name, _KERNELS / "__init__.py", submodule_search_locations=[str(_KERNELS)]

@@ -72,7 +72,7 @@ class Model:
         upper: (dim,) walls [m], +inf where there is none.
         wall_radius: Distance that particles keep from a wall [m].
         restitution: Of walls, in [0, 1].
-        friction: Coulomb coefficient of walls and of self-collision.
+        friction: Coulomb coefficient of walls.
         collision_particles: (S,) particles that may not come closer to each other than
             `collision_distance`.
         collision_distance: [m]; 0 switches self-collision off.
@@ -111,18 +111,29 @@ class Model:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pins", np.flatnonzero(self.inverse_mass == 0.0))
+        self._freeze()
         digest = hashlib.sha256()
         for spec in fields(self):
             if not spec.init or spec.name == "bodies":
                 continue
             value = getattr(self, spec.name)
             if isinstance(value, np.ndarray):
-                value.flags.writeable = False
                 digest.update(f"{spec.name}{value.dtype}{value.shape}".encode() + value.tobytes())
             else:
                 digest.update(f"{spec.name}={value!r}".encode())
-        self.pins.flags.writeable = False
         object.__setattr__(self, "fingerprint", digest.hexdigest())
+
+    def _freeze(self) -> None:
+        """Make the arrays read-only."""
+        for spec in fields(self):
+            value = getattr(self, spec.name, None)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # numpy does not pickle the read-only flag
+        self.__dict__.update(state)
+        self._freeze()
 
     @property
     def num_particles(self) -> int:
@@ -213,7 +224,7 @@ class ModelBuilder:
             strain_limit: Strain beyond which a link is cut short whatever pulls on it; +inf for no
                 limit. For cloth, whose crossing threads are solved in turn.
         """
-        entries = np.asarray(particles, dtype=np.int64).reshape(-1)
+        entries = _indices(particles)
         if rest is None:
             lengths = [self._length(i, j) for i, j in zip(entries[:-1], entries[1:], strict=True)]
         else:
@@ -299,7 +310,7 @@ class ModelBuilder:
 
     def set_self_collision(self, particles: Sequence[int] | np.ndarray, distance: float) -> None:
         """Keep particles at least `distance` [m] apart, at most their smallest distance as placed."""
-        self._collision = (np.asarray(particles, dtype=np.int64).reshape(-1), float(distance))
+        self._collision = (_indices(particles), float(distance))
 
     def add_body(self, body: Body) -> None:
         """Tell a renderer what to draw."""
@@ -334,6 +345,8 @@ class ModelBuilder:
         masses = np.array(self._masses, dtype=np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse_mass = np.where(self._pinned, 0.0, 1.0 / masses)
+        with np.errstate(invalid="ignore"):  # a rest length of 0 is refused below
+            greatest = [rest * (1.0 + limit) for _, rest, _, limit in self._chains]
         # A chain of n particles has n - 1 links; the entry of its last particle holds a dummy.
         rests = [np.append(rest, 1.0) for _, rest, _, _ in self._chains]
         sizes = [len(entries) for entries, *_ in self._chains]
@@ -347,8 +360,7 @@ class ModelBuilder:
             "chain_particles": _joined([entries for entries, *_ in self._chains], np.int64),
             "link_rest": _joined(rests, np.float64),
             "link_compliance": np.repeat([row[2] for row in self._chains], sizes),
-            "link_greatest_length": _joined(rests, np.float64)
-            * (1.0 + np.repeat([row[3] for row in self._chains], sizes)),
+            "link_greatest_length": _joined([np.append(g, np.inf) for g in greatest], np.float64),
             "distance_pairs": pairs,
             "distance_rest": distances[:, 0].copy(),
             "distance_compliance": distances[:, 1].copy(),
@@ -376,6 +388,14 @@ class ModelBuilder:
         if not (0 <= i < count and 0 <= j < count):
             return float("nan")
         return float(np.sqrt(np.sum((self._positions[i] - self._positions[j]) ** 2)))
+
+
+def _indices(particles: Any) -> np.ndarray:
+    """Return particle indices as int64; a float index is a mistake, not a number to round."""
+    indices = np.asarray(particles).reshape(-1)
+    if indices.dtype.kind not in "iu" and indices.size:
+        raise TypeError(f"particles are {particles!r}; expected whole numbers")
+    return indices.astype(np.int64)
 
 
 def _joined(parts: list[np.ndarray], dtype: Any) -> np.ndarray:

@@ -21,6 +21,9 @@ _BATCH_LANES = 32
 _FEWEST_PARTICLES_FOR_THREADS = 4096
 # Candidate pairs of self-collision that a world can hold, per particle.
 _PAIRS_PER_PARTICLE = 24
+# Beyond these h or 1/h^2 would leave the range of float32.
+_SHORTEST_SUBSTEP = 1e-9
+_LONGEST_STEP = 1e3
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ class World:
     ) -> None:
         for name, value in (("num_worlds", num_worlds), ("num_threads", num_threads), ("lanes", lanes)):
             optional = value is None and name != "num_worlds"
-            if not optional and (not isinstance(value, int | np.integer) or value < 1):
+            if not optional and (not _is_whole(value) or value < 1):
                 raise ValueError(f"{name} is {value!r}; expected a whole number from 1 up")
         self.dtype = np.dtype(dtype)
         if self.dtype not in (np.float32, np.float64):
@@ -162,7 +165,7 @@ class World:
             self._set_timing(dt, substeps)
         pins = self.model.pins
         if targets is None:
-            targets = self.x[:, pins]
+            targets = np.ascontiguousarray(self.x[:, pins])
         else:
             targets = np.ascontiguousarray(targets, dtype=self.dtype)
             expected = (self.num_worlds, len(pins), self.model.dim)
@@ -194,10 +197,13 @@ class World:
 
     def _set_timing(self, dt: float, substeps: int) -> None:
         """Check and prepare what depends on the time step; announce a compilation before it."""
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise ValueError(f"dt is {dt}; a step must be positive and finite [s]")
-        if not isinstance(substeps, int | np.integer) or substeps < 1:
+        if not _is_whole(substeps) or substeps < 1:
             raise ValueError(f"substeps is {substeps!r}; expected a whole number from 1 up")
+        if not (_SHORTEST_SUBSTEP <= dt / substeps and dt <= _LONGEST_STEP):
+            raise ValueError(
+                f"dt is {dt} with {substeps} substeps; allowed: dt up to {_LONGEST_STEP} s, substeps "
+                f"of at least {_SHORTEST_SUBSTEP} s"
+            )
         h = dt / substeps
         gravity = float(np.sqrt(np.sum(self.model.gravity**2)))
         decay = float(portable.exp(-self.model.damping * h))
@@ -215,7 +221,7 @@ class World:
             variant.append("self-collision")
         done = compiling.announce_compilation(", ".join(variant))
         none = np.zeros(2, dtype=np.int64)
-        targets = self.x[:, self.model.pins]
+        targets = np.ascontiguousarray(self.x[:, self.model.pins])
         self._advance(targets, (none, *self._shares[0][1:]))
         done()
 
@@ -260,6 +266,10 @@ def _parameters(model: Model, dtype: np.dtype) -> Parameters:
             value = value.astype(dtype if value.dtype.kind == "f" else np.int64)
         values[name] = value
     return Parameters(**values)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def _cores() -> int:

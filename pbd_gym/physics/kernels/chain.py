@@ -20,6 +20,7 @@ from .layout import (
     MULTIPLIER,
     PIVOT,
     POSITION,
+    SCALE,
     START,
     VELOCITY,
 )
@@ -64,7 +65,7 @@ def project_chains_from_start(work, model, inverse_h2, iteration):
     zero_row = row(work, work.shape[0] - 1)
     for chain in range(offsets.shape[0] - 1):
         first, last = offsets[chain], offsets[chain + 1] - 1
-        before, rest_before = zero_row, rest[first]
+        before = zero_row
         for entry in range(first, last):
             i, j = particles[entry], particles[entry + 1]
             link = row(work, i)
@@ -74,11 +75,10 @@ def project_chains_from_start(work, model, inverse_h2, iteration):
                 row(work, j),
                 inverse_mass[i],
                 inverse_mass[j],
-                rest_before,
                 rest[entry],
                 _stiffened(compliance, entry, inverse_h2, iteration),
             )
-            before, rest_before = link, rest[entry]
+            before = link
         _back_substitute(work, particles, inverse_mass, first, last, POSITION)
 
 
@@ -147,40 +147,48 @@ def _eliminate_current(before, a, b, mass_a, mass_b, rest, alpha):
 
 
 @kernel
-def _eliminate_start(before, a, b, mass_a, mass_b, rest_before, rest, alpha):
+def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
     """Eliminate the link before this one; the direction is that of the start of the substep.
 
     C = (|x_a - x_b|^2 - rest^2) / (2 rest) has the gradient (x_a - x_b)/rest: no square root, and
-    with corrections along the start direction the system is no longer symmetric. Where a link has
-    turned by 60 degrees or more within the substep, its current direction is taken.
+    with corrections along the start direction the system is no longer symmetric. Where a link has turned
+    so far within the substep that the start direction does not lead back to its length, its current
+    direction and C = |x_a - x_b| - rest are taken.
     """
     real = type(mass_a)
     one, zero, half = real(1), real(0), real(0.5)
     floor = real(_PIVOT_FLOOR)
-    inverse, inverse_before = one / rest, one / rest_before
+    inverse = one / rest
     for lane in range(LANES):
-        square, aligned = zero, zero
+        square, aligned, square_start = zero, zero, zero
         for k in range(DIM):
             now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
             square += now * now
             aligned += now * start
-        turned = aligned < half * rest * rest
+            square_start += start * start
+        length = np.sqrt(square)
+        # the line along the start direction must meet the sphere of radius rest, with a margin
+        off = square * square_start - aligned * aligned
+        turned = aligned <= zero or off > half * rest * rest * square_start
+        current = one / length if length > zero else zero
+        scale = current if turned else inverse
         own, lower, upper = zero, zero, zero
         for k in range(DIM):
             now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
             link_before = before[POSITION + k * LANES + lane] - a[POSITION + k * LANES + lane]
-            direction = (now if turned else start) * inverse
-            own += now * inverse * direction
-            lower += now * inverse * before[DIRECTION + k * LANES + lane]
-            upper += link_before * inverse_before * direction
+            direction = (now if turned else start) * scale
+            own += now * scale * direction
+            lower += now * scale * before[DIRECTION + k * LANES + lane]
+            upper += link_before * before[SCALE + lane] * direction
             a[DIRECTION + k * LANES + lane] = direction
+        a[SCALE + lane] = scale
         diagonal = (mass_a + mass_b) * own + alpha
         factor = -mass_a * lower * before[PIVOT + lane]
         coupling = -mass_a * upper
         pivot = max(diagonal - factor * coupling, floor * diagonal)
-        error = half * (square * inverse - rest)
+        error = (length - rest) if turned else half * (square * inverse - rest)
         a[COUPLING + lane] = coupling
         a[PIVOT + lane] = one / pivot if pivot > zero else zero
         a[MULTIPLIER + lane] = error - factor * before[MULTIPLIER + lane]

@@ -16,4 +16,5 @@ DIRECTION = 3 * DIM * LANES  # unit vector along which the link is corrected
 COUPLING = 4 * DIM * LANES  # off-diagonal entry that couples the link to the one before
 PIVOT = COUPLING + LANES  # reciprocal pivot of the elimination
 MULTIPLIER = PIVOT + LANES  # right-hand side, then the link's multiplier
-WIDTH = MULTIPLIER + LANES
+SCALE = MULTIPLIER + LANES  # 1/length that turns the link into its gradient
+WIDTH = SCALE + LANES
