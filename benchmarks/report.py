@@ -13,8 +13,9 @@ def markdown(rows: Sequence[Any], machine: str) -> str:
     """Return the results as markdown: complete steps, their share of the kernel, start-up."""
     parts = [
         f"Measured on {machine}.",
-        "Complete control steps per second, all worlds together (least to greatest round):",
-        _table(rows, ("make", "make_vec"), _speed),
+        "Complete control steps per second, all worlds together, median over the rounds "
+        f"({_spread(rows)}):",
+        _table(rows, ("make", "make_vec"), lambda row: _si(row.median)),
         "The bare kernel (`World.step`), and in brackets the speed of the complete step "
         "as a share of it:",
         _table(rows, ("kernel",), lambda row: f"{_si(row.median)} ({_share(row, rows)})"),
@@ -25,8 +26,16 @@ def markdown(rows: Sequence[Any], machine: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _speed(row: Any) -> str:
-    return f"{_si(row.median)} ({_si(row.least)} to {_si(row.greatest)})"
+def _spread(rows: Sequence[Any]) -> str:
+    """Say how far the slowest and fastest round were from the median."""
+    complete = [row for row in rows if row.measure in ("make", "make_vec")]
+    spreads = sorted(
+        max(row.greatest - row.median, row.median - row.least) / row.median for row in complete
+    )
+    middle, worst = spreads[len(spreads) // 2], spreads[-1]
+    return (
+        f"single rounds differ from it by {middle:.0%} in a typical case, {worst:.0%} in the worst"
+    )
 
 
 def _si(value: float) -> str:

@@ -105,7 +105,7 @@ def vector_case(id: str, worlds: int, threads: int) -> Case:
 
 
 def kernel_case(id: str, worlds: int, threads: int) -> Case:
-    """Step the bare worlds of the same task from the same start, their pins to and fro."""
+    """Step the bare worlds of the same task from the same start, their pins moving back and forth."""
     env: Any = gymnasium.make_vec(id, num_envs=worlds, vectorization_mode="vector_entry_point")
     env.reset(seed=0)
     task = env.unwrapped.task
