@@ -21,7 +21,7 @@ MODES = tuple(AutoresetMode)
 class FragileRope(Rope):
     """A rope that counts as diverged a little outside the middle, so that worlds end apart."""
 
-    sanity_bound: ClassVar[float] = 1.35
+    sanity_bound: ClassVar[float] = 1.05
 
 
 def make(id, **keywords):
