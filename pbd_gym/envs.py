@@ -1,9 +1,10 @@
-"""The two Gymnasium faces of a task: one world, or n. The one place where episodes begin and end."""
+"""The two Gymnasium faces of a task, one world or n: where episodes begin and end."""
 
 from __future__ import annotations
 
 import dataclasses
 import importlib
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
@@ -14,6 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from pbd_gym.physics import Snapshot
 from pbd_gym.rendering import Renderer, Window
+from pbd_gym.rendering.renderer import check_size
 from pbd_gym.tasks import Batch, Task
 
 _RENDER_MODES = ["rgb_array", "human"]
@@ -34,7 +36,7 @@ class EpisodeState:
 
     worlds: Snapshot
     variables: dict[str, np.ndarray]
-    generators: list[dict[str, Any]]
+    generators: list[Mapping[str, Any]]
     elapsed: np.ndarray
     ended: np.ndarray
     begun: np.ndarray
@@ -65,7 +67,7 @@ class _Pictures:
     def __init__(self, task: Task, render_mode: str | None, render_size: tuple[int, int]) -> None:
         if render_mode is not None and render_mode not in _RENDER_MODES:
             raise ValueError(f"render_mode is {render_mode!r}; allowed: None, {_RENDER_MODES}")
-        self.task, self.size = task, render_size
+        self.task, self.size = task, check_size(render_size)
         self.renderer: Renderer | None = None
         self.window: Window | None = None
 
@@ -75,7 +77,7 @@ class _Pictures:
             self.renderer = Renderer(
                 self.task.model, self.task.view, size=self.size, rails=self.task.rails
             )
-        goal = self.task.goal(batch.variables, world) if batch.variables else None
+        goal = self.task.goal(batch.variables, world)
         return self.renderer.draw(batch.world.x[world], goal, self.task.goal_radius)
 
     def show(self, frame: np.ndarray) -> None:
@@ -135,10 +137,11 @@ class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Begin an episode; options fix quantities that are drawn otherwise (see the task).
 
         Raises:
-            ValueError: For an unknown option or one out of range.
+            TypeError, ValueError: For an unknown option or one out of range. Nothing changes then.
         """
+        fixed = self._batch.check_options(_as_dict(options))
         super().reset(seed=seed)
-        self._batch.reset(np.zeros(1, dtype=np.int64), [self.np_random], options or {})
+        self._batch.reset(np.zeros(1, dtype=np.int64), [self.np_random], fixed)
         self._begun = True
         if self.render_mode == "human":
             self.render()
@@ -194,8 +197,10 @@ class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Continue from a state of `get_state`, to the last bit.
 
         Raises:
-            ValueError: If the state is of another model or number of worlds.
+            TypeError: If it is no `EpisodeState`.
+            ValueError: If it is of another task, model or number of worlds. Nothing changes then.
         """
+        _check_state(state, 1)
         self._batch.set_state((state.worlds, state.variables))
         self.np_random.bit_generator.state = state.generators[0]
         self._begun = bool(state.begun[0])
@@ -238,8 +243,9 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     ) -> None:
         if render_mode == "human":
             raise ValueError("render_mode is 'human'; a vector environment draws 'rgb_array' only")
-        if max_episode_steps is not None and max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps is {max_episode_steps}; expected at least 1")
+        _check_count("num_envs", num_envs)
+        if max_episode_steps is not None:
+            _check_count("max_episode_steps", max_episode_steps)
         self.task = make_task(task, arguments)
         self._pictures = _Pictures(self.task, render_mode, render_size)
         self.render_mode = render_mode
@@ -277,15 +283,19 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         Raises:
             TypeError, ValueError: For a wrong seed, mask or option. Nothing changes then.
         """
-        fixed = dict(options or {})
+        fixed = _as_dict(options)
         mask = self._check_mask(fixed.pop("reset_mask", None))
+        fixed = self._batch.check_options(fixed)
         generators = self._seeded(seed, mask)
         self._begin(np.flatnonzero(mask), generators, fixed)
         self._generators = generators
         return self._batch.observe(), {}
 
     def _begin(
-        self, worlds: np.ndarray, generators: list[np.random.Generator], fixed: dict[str, Any]
+        self,
+        worlds: np.ndarray,
+        generators: list[np.random.Generator],
+        fixed: dict[str, np.ndarray],
     ) -> None:
         self._batch.reset(worlds, generators, fixed)
         self._elapsed[worlds] = 0
@@ -310,7 +320,11 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """Return the generators of all worlds, anew where a masked world is given a seed."""
         if seed is None:
             return self._generators
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+        if not isinstance(seed, int | list | tuple):
+            raise TypeError(
+                f"seed is {seed!r}; expected None, a whole number or a list of {self.num_envs}"
+            )
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
         if len(seeds) != self.num_envs:
             raise ValueError(f"{len(seeds)} seeds were given for {self.num_envs} worlds")
         return [
@@ -354,9 +368,7 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             observation = self._batch.observe()
         return observation, reward, terminated, truncated, infos
 
-    def _begin_ended(
-        self, observation: np.ndarray, info: dict[str, np.ndarray]
-    ) -> dict[str, Any]:
+    def _begin_ended(self, observation: np.ndarray, info: dict[str, np.ndarray]) -> dict[str, Any]:
         """Begin the ended episodes anew; return infos that hold how they ended."""
         ended = self._ended.copy()
         infos = _infos(info, ~ended)
@@ -378,7 +390,7 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return tuple(self._pictures.draw(self._batch, world) for world in range(self.num_envs))
 
     def get_state(self) -> EpisodeState:
-        """Return all that the continuation of every world depends on, random generators included."""
+        """Return all that the worlds' continuation depends on, random generators included."""
         worlds, variables = self._batch.get_state()
         generators = [generator.bit_generator.state for generator in self._generators]
         counters = self._elapsed.copy(), self._ended.copy(), self._begun.copy()
@@ -388,8 +400,10 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """Continue from a state of `get_state`, to the last bit.
 
         Raises:
-            ValueError: If the state is of another model or number of worlds. Nothing changes then.
+            TypeError: If it is no `EpisodeState`.
+            ValueError: If it is of another task, model or number of worlds. Nothing changes then.
         """
+        _check_state(state, self.num_envs)
         self._batch.set_state((state.worlds, state.variables))
         for generator, saved in zip(self._generators, state.generators, strict=True):
             generator.bit_generator.state = saved
@@ -408,6 +422,29 @@ def _infos(info: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
         infos[name] = wide if mask.all() else np.where(mask, wide, wide.dtype.type(0))
         infos[f"_{name}"] = mask.copy()
     return infos
+
+
+def _as_dict(options: dict[str, Any] | None) -> dict[str, Any]:
+    """Return a copy of reset options."""
+    if options is not None and not isinstance(options, dict):
+        raise TypeError(f"options is {options!r}; expected None or a dict")
+    return dict(options or {})
+
+
+def _check_count(name: str, value: Any) -> None:
+    """Refuse what is no positive whole number."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise ValueError(f"{name} is {value!r}; expected a whole number from 1 up")
+
+
+def _check_state(state: Any, num_worlds: int) -> None:
+    """Refuse what is no state, or one of another number of worlds."""
+    if not isinstance(state, EpisodeState):
+        raise TypeError(f"the state is {state!r}; expected an EpisodeState of get_state()")
+    for name in ("generators", "elapsed", "ended", "begun"):
+        count = len(getattr(state, name))
+        if count != num_worlds:
+            raise ValueError(f"the state holds {name} of {count} worlds; expected {num_worlds}")
 
 
 def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:

@@ -1,4 +1,4 @@
-"""What a task is: actions to pin targets, observation, reward, success, start; for n worlds at once."""
+"""What a task is: start, actions to pin targets, observation, reward; for n worlds at once."""
 
 from __future__ import annotations
 
@@ -125,10 +125,14 @@ class Task:
     @cached_property
     def observation_space(self) -> spaces.Box:
         """What `observe` returns for one world."""
-        quantities = {name: spec.low[None] for name, spec in self.draws.items()}
-        start = self.start(quantities)
+        start = self.lowest_start
         size = self.observe(start.x, start.v, start.variables).shape[1]
         return spaces.Box(-_OBSERVATION_LIMIT, _OBSERVATION_LIMIT, (size,), np.float32)
+
+    @cached_property
+    def lowest_start(self) -> Start:
+        """Where one world begins if every quantity is drawn at its least: tells kinds and sizes."""
+        return self.start({name: spec.low[None] for name, spec in self.draws.items()})
 
     @property
     def view(self) -> tuple[np.ndarray, np.ndarray]:
@@ -166,7 +170,7 @@ class Task:
         raise NotImplementedError
 
     def goal(self, variables: Variables, world: int) -> np.ndarray | None:
-        """Return where particles should be, (N, dim) [m], NaN where anything goes; None for no goal."""
+        """Return where particles should be, (N, dim) [m], NaN where anything goes, or None."""
         return None
 
     @property

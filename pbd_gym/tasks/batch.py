@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pbd_gym.physics import Snapshot, World
-from pbd_gym.tasks.base import Task, Variables
-
+from pbd_gym.tasks.base import Start, Task, Variables
 
 _LEAST, _GREATEST = np.float32(-1.0), np.float32(1.0)
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 class Outcome(NamedTuple):
@@ -39,23 +39,26 @@ class Batch:
     def __init__(self, task: Task, num_worlds: int, num_threads: int | None = None) -> None:
         self.task = task
         self.world = World(task.model, num_worlds, num_threads=num_threads)
-        self.variables: Variables = {}
+        # something of each kind from the beginning, so that a state to set can be compared with it
+        fresh = self._fresh(task.lowest_start)
+        self.variables = {
+            name: np.repeat(value, num_worlds, axis=0) for name, value in fresh.items()
+        }
         self._draws = sum(len(spec.low) for spec in task.draws.values())
 
     def reset(
-        self, worlds: np.ndarray, generators: list[np.random.Generator], options: dict[str, Any]
+        self,
+        worlds: np.ndarray,
+        generators: list[np.random.Generator],
+        fixed: dict[str, np.ndarray],
     ) -> None:
         """Begin new episodes.
 
         Args:
             worlds: (n,) indices of the worlds.
             generators: Of all W worlds; each begun world draws from its own.
-            options: Quantities to fix instead: (k,) for all worlds or (W, k), by name.
-
-        Raises:
-            ValueError: For an unknown option or one out of range. Nothing changes then.
+            fixed: Quantities to fix instead, as `check_options` returns them.
         """
-        fixed = self._check_options(options)
         uniforms = np.array([generators[world].random(self._draws) for world in worlds])
         quantities, first = {}, 0
         for name, spec in self.task.draws.items():
@@ -67,42 +70,53 @@ class Batch:
         start = self.task.start(quantities)
         self.world.x[worlds] = start.x
         self.world.v[worlds] = start.v
-        self._remember(worlds, start.variables)
+        for name, value in self._fresh(start).items():
+            self.variables[name][worlds] = value
 
-    def _remember(self, worlds: np.ndarray, variables: Variables) -> None:
-        """Store what the task and the batch keep of the new episodes."""
-        x, v = self.world.x[worlds], self.world.v[worlds]
-        action = np.zeros((len(worlds), *self.task.action_space.shape), dtype=np.float32)
-        fresh = dict(variables)
-        fresh["start_performance"] = self.task.judge(x, v, action, variables).performance
-        fresh["streak"] = np.zeros(len(worlds), dtype=np.int64)
-        for name, values in fresh.items():
-            if name not in self.variables:
-                shape = (self.world.num_worlds, *values.shape[1:])
-                self.variables[name] = np.zeros(shape, dtype=values.dtype)
-            self.variables[name][worlds] = values
+    def _fresh(self, start: Start) -> Variables:
+        """Return what the task and the batch remember of new episodes, (n, ...) each."""
+        action = np.zeros((len(start.x), *self.task.action_space.shape), dtype=np.float32)
+        judgement = self.task.judge(start.x, start.v, action, start.variables)
+        return {
+            **start.variables,
+            "start_performance": judgement.performance,
+            "streak": np.zeros(len(start.x), dtype=np.int64),
+        }
 
-    def _check_options(self, options: dict[str, Any]) -> dict[str, np.ndarray]:
-        """Return the options as arrays (W, k)."""
+    def check_options(self, options: dict[str, Any]) -> dict[str, np.ndarray]:
+        """Return reset options as arrays (W, k), given as (k,) for all worlds or as (W, k).
+
+        Raises:
+            ValueError: For an unknown option or one out of range.
+        """
         fixed = {}
         for name, value in options.items():
             if name not in self.task.draws:
                 known = ", ".join(self.task.draws)
                 raise ValueError(f"unknown reset option {name!r}; allowed: {known}")
             spec = self.task.draws[name]
-            try:
-                values = np.asarray(value, dtype=np.float64)
-                values = np.broadcast_to(values, (self.world.num_worlds, len(spec.low)))
-            except (TypeError, ValueError) as error:
-                raise ValueError(
-                    f"reset option {name!r} is {value!r}; expected {len(spec.low)} numbers"
-                ) from error
+            values = self._option(name, value, len(spec.low))
             if not ((spec.least <= values) & (values <= spec.greatest)).all():
                 raise ValueError(
                     f"reset option {name!r} is {value!r}; allowed: {spec.least} to {spec.greatest}"
                 )
             fixed[name] = values
         return fixed
+
+    def _option(self, name: str, value: Any, count: int) -> np.ndarray:
+        """Return an option of `count` numbers as (W, count)."""
+        worlds = self.world.num_worlds
+        try:
+            values = np.asarray(value)
+        except ValueError:  # rows of different lengths
+            values = np.empty(0)
+        shapes = [(count,), (worlds, count), *([()] if count == 1 else [])]
+        if values.dtype.kind not in "fiu" or values.shape not in shapes:
+            raise ValueError(
+                f"reset option {name!r} is {value!r}; expected {count} numbers, for all worlds or "
+                f"for each of {worlds}"
+            )
+        return np.broadcast_to(values.astype(np.float64), (worlds, count))
 
     def check_actions(self, actions: Any) -> np.ndarray:
         """Return actions as a float32 array (W, size).
@@ -120,11 +134,12 @@ class Batch:
         expected = (self.world.num_worlds, *self.task.action_space.shape)
         if array.shape != expected:
             raise ValueError(f"actions have shape {array.shape}; expected {expected}")
-        array = array.astype(np.float32)
         if not np.isfinite(array).all():
             world, index = np.argwhere(~np.isfinite(array))[0]
             raise ValueError(f"action {index} of world {world} is {array[world, index]}")
-        return array
+        if array.dtype == np.float64:  # numbers that only float64 can hold would become infinite
+            array = np.minimum(np.maximum(array, -_LARGEST), _LARGEST)
+        return array.astype(np.float32)
 
     def step(self, actions: np.ndarray) -> Outcome:
         """Advance every world by one control step; actions as `check_actions` returns them."""
@@ -142,7 +157,8 @@ class Batch:
         possible = np.maximum(task.best_performance - start, 1e-6)
         info = {
             "is_success": streak >= task.hold_steps,
-            "normalized_performance": 1.0 - (task.best_performance - judgement.performance) / possible,
+            "normalized_performance": 1.0
+            - (task.best_performance - judgement.performance) / possible,
             **judgement.terms,
             "action_clipped": np.abs(actions - clipped).max(axis=1),
             "pin_limited": short,
@@ -175,8 +191,16 @@ class Batch:
         """Continue from a state of `get_state`.
 
         Raises:
-            ValueError: If it is of another model or another number of worlds.
+            ValueError: If it is of another task, model or number of worlds. Nothing changes then.
         """
         snapshot, variables = state
+        own, other = _kinds(self.variables), _kinds(variables)
+        if own != other:
+            raise ValueError(f"the state remembers {other}; expected {own}")
         self.world.restore(snapshot)
         self.variables = {name: value.copy() for name, value in variables.items()}
+
+
+def _kinds(variables: Variables) -> dict[str, str]:
+    """Return type and shape of each variable by name."""
+    return {name: f"{value.dtype} {value.shape}" for name, value in sorted(variables.items())}
