@@ -10,10 +10,10 @@ from pathlib import Path
 
 
 def describe_machine() -> str:
-    """Return processor, cores, versions and commit in one line."""
+    """Return processor, cores, load, versions and commit in one line."""
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "gymnasium"))
     return (
-        f"{_processor()}, {_cores()} cores, {platform.system()}, "
+        f"{_processor()}, {_cores()} cores{_load()}, {platform.system()}, "
         f"Python {platform.python_version()}, {packages}, commit {_commit()}"
     )
 
@@ -22,6 +22,11 @@ def _cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def _load() -> str:
+    """Say how many processes waited for a core over the last minute, where that is known."""
+    return f" at load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
 
 
 def _processor() -> str:

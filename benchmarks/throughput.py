@@ -105,7 +105,7 @@ def vector_case(id: str, worlds: int, threads: int) -> Case:
 
 
 def kernel_case(id: str, worlds: int, threads: int) -> Case:
-    """Step the bare worlds of the same task from the same start, their pins moving back and forth."""
+    """Step the bare worlds of the same task from the same start, their pins swaying a little."""
     env: Any = gymnasium.make_vec(id, num_envs=worlds, vectorization_mode="vector_entry_point")
     env.reset(seed=0)
     task = env.unwrapped.task
@@ -235,10 +235,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     start_ids = [] if options.no_start_up else [id for id in options.ids if id in START_UP_IDS]
     per_round = 1 + 2 * sum(2 if count >= 64 else 1 for count in options.worlds)
     progress = Progress(2 * len(start_ids) + len(options.ids) * per_round * (options.rounds + 1))
+    machine = describe_machine()  # now: the load is that of others
     rows = measure_starts(start_ids, progress)
     for id in options.ids:
         rows += measure_id(id, options.worlds, options.rounds, options.seconds, progress)
-    text = markdown(rows, describe_machine())
+    text = markdown(rows, machine)
     print(text)
     options.out.mkdir(parents=True, exist_ok=True)
     with open(options.out / "throughput.csv", "w", newline="", encoding="utf-8") as file:
