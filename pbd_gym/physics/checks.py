@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,9 @@ def check_model(
     _check_self_collision(columns, settings["collision_distance"])
 
 
-def _refuse_if(wrong: np.ndarray, what: str, values: np.ndarray, allowed: str) -> None:
+def _refuse_if(wrong: Any, what: str, values: np.ndarray, allowed: str) -> None:
     """Raise for the first index at which `wrong` is true."""
-    if wrong.any():
+    if np.any(wrong):
         index = int(np.flatnonzero(wrong)[0])
         raise ValueError(f"{what} {index} is {values[index]}; {allowed}")
 
@@ -102,7 +103,7 @@ def _check_chains(columns: dict[str, Any]) -> None:
     sizes = np.diff(offsets)
     _refuse_if(sizes < 2, "number of particles in chain", sizes, "a chain has at least 2")
     _check_indices(particles, len(columns["positions"]), "particle of chain entry")
-    for chain, (first, last) in enumerate(zip(offsets[:-1], offsets[1:], strict=True)):
+    for chain, (first, last) in enumerate(pairwise(offsets)):
         unique, counts = np.unique(particles[first:last], return_counts=True)
         if (counts > 1).any():
             raise ValueError(

@@ -12,6 +12,7 @@ import functools
 import hashlib
 import importlib
 import importlib.util
+import operator
 import os
 import sys
 import tempfile
@@ -26,6 +27,7 @@ import numba
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
+_SETTINGS: Any = importlib.import_module("numba.core.config")
 _KERNELS = Path(__file__).parent / "kernels"
 # two threads that load the same kernels would see each other's half-loaded modules
 _loading = threading.Lock()
@@ -41,14 +43,14 @@ def kernel(function: Callable[..., Any]) -> Any:
     folder = cache_folder()
     if folder is None:
         return numba.njit(**options)(function)
-    # numba names its files after the source file alone: each loaded package needs a folder of its own
+    # numba names its files after the source file alone: each loaded package needs a folder of its
+    # own
     folder /= function.__module__.split(".")[-2]
-    before = numba.config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
-    numba.config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]
+    before, _SETTINGS.CACHE_DIR = _SETTINGS.CACHE_DIR, str(folder)
     try:
         return numba.njit(cache=True, **options)(function)
     finally:
-        numba.config.CACHE_DIR = before  # pyright: ignore[reportAttributeAccessIssue]
+        _SETTINGS.CACHE_DIR = before
 
 
 def _row(typing_context: Any, array: Any, index: Any) -> Any:
@@ -64,15 +66,9 @@ def _row(typing_context: Any, array: Any, index: Any) -> Any:
     return types.CPointer(array.dtype)(array, types.intp), generate
 
 
-if numba.config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
-
-    def row(array: Any, index: int) -> Any:
-        """Return a row of a two-dimensional array."""
-        return array[index]
-else:
-    # A bare pointer to the row. A view would be counted as a reference, and the atomic counting of
-    # three views per constraint takes longer than the arithmetic on 16 lanes.
-    row = intrinsic(_row)
+# A bare pointer to a row of a two-dimensional array. A view would be counted as a reference, and the
+# atomic counting of three views per constraint takes longer than the arithmetic on 16 lanes.
+row: Any = operator.getitem if _SETTINGS.DISABLE_JIT else intrinsic(_row)
 
 
 def load_kernels(dim: int, lanes: int) -> ModuleType:

@@ -1,10 +1,11 @@
-"""What does not change while time runs: the Model, and the ModelBuilder that collects and checks it."""
+"""What does not change while time runs: the Model, and the ModelBuilder that makes it."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -141,7 +142,7 @@ class Model:
         return len(self.inverse_mass)
 
     def links(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the links of all chains as pairs of particles, (links, 2), and rest lengths [m]."""
+        """Return the links of all chains: their particles (links, 2) and rest lengths [m]."""
         last = np.zeros(len(self.chain_particles), dtype=bool)
         last[self.chain_offsets[1:] - 1] = True
         entries = np.flatnonzero(~last)
@@ -189,7 +190,9 @@ class ModelBuilder:
         """
         points = np.atleast_2d(np.array(positions, dtype=np.float64))
         if points.ndim != 2 or points.shape[1] != self.dim:
-            raise ValueError(f"positions have shape {np.shape(positions)}; expected (n, {self.dim})")
+            raise ValueError(
+                f"positions have shape {np.shape(positions)}; expected (n, {self.dim})"
+            )
         first = len(self._masses)
         self._positions.extend(points)
         self._masses.extend([float(mass)] * len(points))
@@ -226,9 +229,11 @@ class ModelBuilder:
         """
         entries = _indices(particles)
         if rest is None:
-            lengths = [self._length(i, j) for i, j in zip(entries[:-1], entries[1:], strict=True)]
+            lengths = [self._length(i, j) for i, j in pairwise(entries)]
         else:
-            lengths = np.broadcast_to(np.asarray(rest, dtype=np.float64), (max(len(entries) - 1, 0),))
+            lengths = np.broadcast_to(
+                np.asarray(rest, dtype=np.float64), (max(len(entries) - 1, 0),)
+            )
         self._chains.append((entries, np.array(lengths), float(compliance), float(strain_limit)))
 
     def add_distance(
@@ -254,9 +259,7 @@ class ModelBuilder:
         length = self._length(i, j) if rest is None else float(rest)
         self._distances.append((int(i), int(j), length, float(compliance), float(stiffness)))
 
-    def add_bend(
-        self, a: int, b: int, c: int, *, compliance: float, damping: float = 0.0
-    ) -> None:
+    def add_bend(self, a: int, b: int, c: int, *, compliance: float, damping: float = 0.0) -> None:
         """Resist bending at b: the vector x_a - 2 x_b + x_c is drawn to zero (straight rest).
 
         Args:
@@ -309,7 +312,7 @@ class ModelBuilder:
         self.set_room(lower, upper, friction=friction, restitution=restitution, radius=radius)
 
     def set_self_collision(self, particles: Sequence[int] | np.ndarray, distance: float) -> None:
-        """Keep particles at least `distance` [m] apart, at most their smallest distance as placed."""
+        """Keep particles `distance` [m] apart, at most the smallest distance as placed."""
         self._collision = (_indices(particles), float(distance))
 
     def add_body(self, body: Body) -> None:

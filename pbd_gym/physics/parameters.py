@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 
 class Parameters(NamedTuple):
-    """A Model as the kernels read it: the arrays of `pbd_gym.physics.Model` in the state's dtype."""
+    """The arrays of a `pbd_gym.physics.Model` in the state's dtype."""
 
     positions: Any
     inverse_mass: Any

@@ -6,7 +6,7 @@ import io
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -97,9 +97,11 @@ class World:
         num_threads: int | None = None,
         lanes: int | None = None,
     ) -> None:
-        for name, value in (("num_worlds", num_worlds), ("num_threads", num_threads), ("lanes", lanes)):
-            optional = value is None and name != "num_worlds"
-            if not optional and (not _is_whole(value) or value < 1):
+        counts = {"num_worlds": num_worlds, "num_threads": num_threads, "lanes": lanes}
+        for name, value in counts.items():
+            if value is None and name != "num_worlds":
+                continue
+            if not _is_whole(value) or value < 1:
                 raise ValueError(f"{name} is {value!r}; expected a whole number from 1 up")
         self.dtype = np.dtype(dtype)
         if self.dtype not in (np.float32, np.float64):
@@ -199,10 +201,10 @@ class World:
         """Check and prepare what depends on the time step; announce a compilation before it."""
         if not _is_whole(substeps) or substeps < 1:
             raise ValueError(f"substeps is {substeps!r}; expected a whole number from 1 up")
-        if not (_SHORTEST_SUBSTEP <= dt / substeps and dt <= _LONGEST_STEP):
+        if not (dt / substeps >= _SHORTEST_SUBSTEP and dt <= _LONGEST_STEP):
             raise ValueError(
-                f"dt is {dt} with {substeps} substeps; allowed: dt up to {_LONGEST_STEP} s, substeps "
-                f"of at least {_SHORTEST_SUBSTEP} s"
+                f"dt is {dt} s in {substeps} substeps; allowed: at most {_LONGEST_STEP} s, and at "
+                f"least {_SHORTEST_SUBSTEP} s a substep"
             )
         h = dt / substeps
         gravity = float(np.sqrt(np.sum(self.model.gravity**2)))
@@ -216,7 +218,12 @@ class World:
 
     def _warm_up(self) -> None:
         """Compile on a world of its own, so that the first real step is like any other."""
-        variant = [f"{self.model.dim}D", self.model.integrator, f"{self.lanes} lanes", self.dtype.name]
+        variant = [
+            f"{self.model.dim}D",
+            self.model.integrator,
+            f"{self.lanes} lanes",
+            self.dtype.name,
+        ]
         if self.model.collision_distance:
             variant.append("self-collision")
         done = compiling.announce_compilation(", ".join(variant))
@@ -268,7 +275,7 @@ def _parameters(model: Model, dtype: np.dtype) -> Parameters:
     return Parameters(**values)
 
 
-def _is_whole(value: Any) -> bool:
+def _is_whole(value: Any) -> TypeGuard[int]:
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 

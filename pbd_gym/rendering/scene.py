@@ -9,7 +9,7 @@ import numpy as np
 from pbd_gym.physics.model import Body, Linkage, Model
 from pbd_gym.rendering.curves import finite_rows
 
-Segment = tuple[Sequence[float], Sequence[float]]
+Segment = tuple["Sequence[float] | np.ndarray", "Sequence[float] | np.ndarray"]
 
 _BOB_DENSITY = 500.0  # [kg/m3]; a bob is drawn as a wooden ball of its mass
 

@@ -13,8 +13,8 @@ class SwingUp:
     """Energy pumping (Astrom and Furuta 2000), then a linear-quadratic regulator near the top.
 
     Bobs of equal mass hang on links of equal length from a pivot whose acceleration is the input.
-    Angles are measured from upright, counter-clockwise. Only a baseline: unlike the physics it uses library
-    linear algebra, so its actions may differ in their last bits between machines.
+    Angles are measured from upright, counter-clockwise. Only a baseline: unlike the physics it
+    uses library linear algebra, so its actions may differ in their last bits between machines.
 
     Attributes:
         links: Number of links.
@@ -38,7 +38,8 @@ class SwingUp:
     def _gains(self) -> np.ndarray:
         """Feedback (2 links + 2,) of acceleration on angles, rates, pivot position and velocity.
 
-        Linearised at the top, M theta'' = G theta + b a with M_ij = l (n - max(i, j)), G_ii = g (n - i),
+        Linearised at the top, M theta'' = G theta + b a with M_ij = l (n - max(i, j)), G_ii = g (n
+        - i),
         b_i = n - i (i from 0): the pivot's acceleration tilts the links against it.
         """
         count, size = self.links, 2 * self.links + 2
@@ -74,7 +75,9 @@ class SwingUp:
         rate = direction[:, :, 0] * motion[:, :, 1] - direction[:, :, 1] * motion[:, :, 0]
         state = np.concatenate([angle, rate, pivot[:, None], velocity[:, None]], axis=1)
         balance = -state @ self._gains
-        near_top = (np.abs(angle) < 0.5).all(axis=1) & (np.abs(balance) < 3.0 * self.max_acceleration)
+        near_top = (np.abs(angle) < 0.5).all(axis=1) & (
+            np.abs(balance) < 3.0 * self.max_acceleration
+        )
         acceleration = np.where(near_top, balance, self._pump(pivot, velocity, direction, motion))
         return np.clip((velocity + acceleration * self.dt) / self.max_speed, -1.0, 1.0).astype(
             np.float32
@@ -91,7 +94,9 @@ class SwingUp:
         position = self.link_length * np.cumsum(direction, axis=1)
         speed = self.link_length * np.cumsum(motion, axis=1)
         top = self.link_length * np.sum(np.arange(1, self.links + 1))
-        energy = 0.5 * np.sum(speed**2, axis=(1, 2)) + self.gravity * np.sum(position[:, :, 1], axis=1)
+        energy = 0.5 * np.sum(speed**2, axis=(1, 2)) + self.gravity * np.sum(
+            position[:, :, 1], axis=1
+        )
         missing = (self.gravity * top - energy) / (2.0 * self.gravity * top)
         # in the pivot's frame its acceleration a gives the bobs the power -a * sum of v_x
         momentum = np.sum(speed[:, :, 0], axis=1)
@@ -115,7 +120,7 @@ def _discrete(drift: np.ndarray, push: np.ndarray, dt: float) -> tuple[np.ndarra
 def _regulator(
     drift: np.ndarray, push: np.ndarray, weights: np.ndarray, effort: float
 ) -> np.ndarray:
-    """Return the gains of the discrete linear-quadratic regulator by iterating Riccati's equation."""
+    """Return the gains of the discrete regulator by iterating Riccati's equation."""
     cost, gains = weights, np.zeros(len(push))
     for _ in range(5000):
         gains = (push @ cost @ drift) / (effort + push @ cost @ push)

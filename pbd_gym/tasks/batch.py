@@ -170,12 +170,12 @@ class Batch:
         """Return which worlds left all bounds; they are put back to where the model was built."""
         x = self.world.x
         # written so that NaN counts as out of bounds
-        within = (np.abs(x) < self.task.sanity_bound).all(axis=(1, 2))
-        if within.all():
-            return ~within
-        x[~within] = self.task.model.positions
-        self.world.v[~within] = 0.0
-        return ~within
+        within = np.abs(x) < self.task.sanity_bound
+        diverged = np.asarray(~within.all(axis=(1, 2)))
+        if diverged.any():
+            x[diverged] = self.task.model.positions
+            self.world.v[diverged] = 0.0
+        return diverged
 
     def observe(self) -> np.ndarray:
         """Return the observations, a fresh float32 array (W, size) within the space's bounds."""

@@ -26,29 +26,36 @@ class Cloth(Task):
     """A cloth hangs by two corners above a table; it must be laid flat on a square.
 
     ## Description
-    A cloth of 12 x 12 particles, 0.6 m wide, hangs from two grippers at the corners of one edge. The agent
-    moves both grippers and has to lay the cloth on a drawn square of the table: free edge first,
-    then down and back. The threads are solved directly, the cloth collides with itself and with the
-    table, with friction.
+    A cloth of 12 x 12 particles, 0.6 m wide, hangs from two grippers at the corners of one edge.
+    The agent moves both grippers and has to lay the cloth on a drawn square of the table: free
+    edge first, then down and back. The threads are solved directly, the cloth collides with itself
+    and with the table, with friction.
 
     ## Action Space
-    `Box(-1, 1, (6,), float32)`: desired velocities x, y, z of the first, then of the second gripper,
-    in units of `max_speed` (1 m/s). The grippers' velocities follow with at most `max_acceleration`
-    (10 m/s2) along each axis, brake before the edges of the workspace (x, y in [-0.8, 0.8] m, z up
-    to 1 m) and stay within 0.97 of the cloth's side of each other. Actions beyond [-1, 1] are clipped.
+    `Box(-1, 1, (6,), float32)`: desired velocities x, y, z of the first, then of the second
+    gripper, in units of `max_speed` (1 m/s). The grippers' velocities follow with at most
+    `max_acceleration` (10 m/s2) along each axis, brake before the edges of the workspace (x, y in
+    [-0.8, 0.8] m, z up to 1 m) and stay within 0.97 of the cloth's side of each other. Actions
+    beyond [-1, 1] are clipped.
 
     ## Observation Space
     `Box(-10, 10, (6 N + 4,), float32)` for N observed particles (144, or 9 with
-    `observation="keypoints"`: corners, middles of the edges, centre): positions relative to the
-    square's centre in the square's axes [m / 0.5 m] (3 N), velocities in the same axes [m/s] (3 N), the
-    square's centre [m] (2) and the cosine and sine of its yaw (2).
+    `observation="keypoints"`: corners, middles of the edges, centre):
+
+    | Part                                         | Size | Unit  |
+    |----------------------------------------------|------|-------|
+    | positions relative to the square's centre    | 3 N  | 0.5 m |
+    | velocities                                   | 3 N  | m/s   |
+    | the square's centre, x, y                    | 2    | m     |
+    | cosine and sine of the square's yaw          | 2    |       |
 
     ## Rewards
-    exp(-5 m / side) in [0, 1] for the mean distance m of all particles from their places on the square.
+    exp(-5 m / side) in [0, 1] for the mean distance m of all particles from their places on the
+    square.
 
     ## Starting State
-    The cloth hangs at rest. The grippers' middle is drawn from x, y in [-0.15, 0.15] m, their
-    height from [0.65, 0.75] m and the yaw of the line between them from [-0.5, 0.5] rad; so are the
+    The cloth hangs at rest. The grippers' middle is drawn from x, y in [-0.1, 0.1] m, their
+    height from [0.65, 0.75] m and the yaw of the line between them from [-0.3, 0.3] rad; so are the
     centre and the yaw of the square.
 
     ## Episode End
@@ -122,13 +129,13 @@ class Cloth(Task):
 
     def declare_draws(self) -> dict[str, Draw]:
         """Draw where the cloth hangs and where it shall lie."""
-        near, far = np.full(2, 0.15), np.full(2, 0.4)
+        near, far = np.full(2, 0.1), np.full(2, 0.4)
         return {
             "middle": draw(-near, near, -far, far),
             "height": draw(0.65, 0.75, self.side + 0.02, 1.0),
-            "yaw": draw(-0.5, 0.5, -_PI, _PI),
+            "yaw": draw(-0.3, 0.3, -_PI, _PI),
             "goal": draw(-near, near, -far, far),
-            "goal_yaw": draw(-0.5, 0.5, -_PI, _PI),
+            "goal_yaw": draw(-0.3, 0.3, -_PI, _PI),
         }
 
     @cached_property
@@ -165,17 +172,10 @@ class Cloth(Task):
     def _in_square(self, vectors: np.ndarray, axis: np.ndarray) -> np.ndarray:
         """Return vectors (n, k, 3) in the axes of the goal squares (n, 2)."""
         cosine, sine = axis[:, :1], axis[:, 1:]
-        turned = np.empty_like(vectors)
+        turned = vectors.copy()
         turned[:, :, 0] = vectors[:, :, 0] * cosine + vectors[:, :, 1] * sine
         turned[:, :, 1] = vectors[:, :, 1] * cosine - vectors[:, :, 0] * sine
-        turned[:, :, 2] = vectors[:, :, 2]
         return turned
-
-    def _relative(self, x: np.ndarray, variables: Variables) -> np.ndarray:
-        """Return positions (n, k, 3) relative to the squares' centres, in the squares' axes [m]."""
-        shifted = x.copy()
-        shifted[:, :, :2] -= variables["goal"][:, None]
-        return self._in_square(shifted, variables["goal_axis"])
 
     @cached_property
     def _observed(self) -> np.ndarray:
@@ -185,14 +185,14 @@ class Cloth(Task):
         return (line[:, None] * self.particles + line).ravel()
 
     def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
-        """Return positions and velocities in the square's axes, and the square."""
+        """Return positions relative to the square, velocities, and the square."""
         worlds, real = len(x), x.dtype.type
-        places = self._relative(x[:, self._observed], variables)
-        motion = self._in_square(v[:, self._observed], variables["goal_axis"])
+        places = x[:, self._observed]
+        places[:, :, :2] -= variables["goal"][:, None]
         return np.concatenate(
             [
                 (places * real(2.0)).reshape(worlds, -1),
-                motion.reshape(worlds, -1),
+                v[:, self._observed].reshape(worlds, -1),
                 variables["goal"],
                 variables["goal_axis"],
             ],
@@ -203,7 +203,9 @@ class Cloth(Task):
         self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
     ) -> Judgement:
         """Judge by the mean distance of the particles from their places."""
-        places = self._relative(x, variables)
+        places = x.copy()
+        places[:, :, :2] -= variables["goal"][:, None]
+        places = self._in_square(places, variables["goal_axis"])
         places[:, :, :2] -= self._square.astype(x.dtype)
         places[:, :, 2] -= x.dtype.type(_TABLE_GAP)
         distance = mean(length(places)).astype(np.float64)
@@ -226,23 +228,24 @@ class Cloth(Task):
         """Put the free edge down at its place, then lower the held edge while moving it back."""
         count = len(self._observed)
         line = round(count**0.5)
-        places = observation[:, : 3 * count].reshape(-1, line, line, 3).astype(np.float64) * 0.5
         cosine, sine = observation[:, -2:-1], observation[:, -1:]
+        places = observation[:, : 3 * count].reshape(-1, count, 3).astype(np.float64) * 0.5
+        places = self._in_square(places, observation[:, -2:]).reshape(-1, line, line, 3)
         grippers = places[:, 0, [0, -1]]
         half = 0.5 * self.side
-        free = places[:, -1, :, :].mean(axis=1)
+        free = places[:, -1].mean(axis=1)
         # the height of the grippers says how much of the cloth may already lie on the table
         height = grippers[:, :, 2].mean(axis=1)
         lying = np.sqrt(np.maximum(self.side**2 - np.minimum(height, self.side) ** 2, 0.0))
         target = np.empty_like(grippers)
         target[:, 0, 0], target[:, 1, 0] = -_SPAN * half, _SPAN * half
-        target[:, :, 1] = (lying - half)[:, None] + 0.03
-        aligned = (np.abs(grippers - target)[:, :, :2].max(axis=(1, 2)) < 0.05) & (
-            np.abs(free[:, 1] + half) < 0.12
-        )
-        down = np.where(aligned | (height < 0.9 * self.side), -0.5, -0.05)
-        velocity = 3.0 * (target - grippers)
-        velocity[:, :, 2] = np.maximum(down, 3.0 * (_TABLE_GAP - height))[:, None]
+        target[:, :, 1] = (lying - half)[:, None]
+        astray = np.abs(grippers - target)[:, :, :2].max(axis=(1, 2)) > 0.1
+        astray |= np.abs(free[:, 1] + half) > 0.15
+        wait = astray & (height > self.side - 0.1) & (height < self.side + 0.03)
+        velocity = 4.0 * (target - grippers)
+        fall = np.maximum(4.0 * (_TABLE_GAP - height), -0.4)
+        velocity[:, :, 2] = np.where(wait, 0.0, fall)[:, None]
         world = np.empty_like(velocity)
         world[:, :, 0] = velocity[:, :, 0] * cosine - velocity[:, :, 1] * sine
         world[:, :, 1] = velocity[:, :, 0] * sine + velocity[:, :, 1] * cosine

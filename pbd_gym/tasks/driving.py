@@ -1,4 +1,4 @@
-"""How actions move pins: bounded acceleration, braking at the workspace's edges, one body's span."""
+"""How actions move pins: bounded acceleration, braking at edges, the span of one body."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ from pbd_gym.physics.compiling import kernel
 
 @kernel
 def drive_pins(
-    x: Any, v: Any, action: Any, pins: Any, axes: Any, workspace: Any, limits: Any, targets: Any, short: Any
+    x: Any,
+    v: Any,
+    action: Any,
+    pins: Any,
+    axes: Any,
+    workspace: Any,
+    limits: Any,
+    targets: Any,
+    short: Any,
 ) -> None:
     """Write where the pins of n worlds are at the end of a control step.
 

@@ -34,12 +34,12 @@ class Pendulum(Task):
     ## Observation Space
     `Box(-10, 10, (2 + 4 links,), float32)`; both kinds of observation are the same here.
 
-    | Num               | Observation                                             | Unit                   |
-    |-------------------|---------------------------------------------------------|------------------------|
-    | 0                 | pivot's position                                        | half the rail          |
-    | 1                 | pivot's velocity                                        | `max_speed`            |
-    | 2 ... 1 + 2 links | direction of each link, from its pivot to its bob, x, y | link lengths           |
-    | then 2 links      | velocity of each bob relative to its own pivot, x, y    | 5 link lengths / s     |
+    | Num            | Observation                                      | Unit             |
+    |----------------|--------------------------------------------------|------------------|
+    | 0              | pivot's position                                 | half the rail    |
+    | 1              | pivot's velocity                                 | `max_speed`      |
+    | 2 ... 1+2links | direction of each link, from top to bottom, x, y | link lengths     |
+    | then 2 links   | rate of change of each direction, x, y           | 5 link lengths/s |
 
     ## Rewards
     The product of dm_control's swing-up task, in [0, 1]: upright * (1 + centred)/2 * (1 + slow)/2 *
@@ -63,8 +63,8 @@ class Pendulum(Task):
     >>> observation, info = env.reset(seed=1, options={"angles": [3.0, 3.0]})
 
     ```
-    Every field of the class is a keyword. `reset` takes the options `angles` [rad from hanging down, each
-    link's own], `rates` [rad/s] and `pivot` [m].
+    Every field of the class is a keyword. `reset` takes the options `angles` [rad from hanging
+    down, each link's own], `rates` [rad/s] and `pivot` [m].
 
     ## Version History
     * v0: first version

@@ -32,21 +32,28 @@ class Rope(Task):
     | 1   | gripper's desired velocity y | -1  | 1   | `max_speed` |
 
     The gripper's velocity follows with at most `max_acceleration` along each axis and brakes before
-    the edges of its workspace, x in [-1, 1] m, y in [-0.5, 1] m. Actions beyond [-1, 1] are clipped.
+    the edges of its workspace, x in [-1, 1] m, y in [-0.5, 1] m. Actions beyond [-1, 1] are
+    clipped.
 
     ## Observation Space
-    `Box(-10, 10, (4 N,), float32)` for N observed particles (24, or 10 with
-    `observation="keypoints"`): gripper's position relative to the workspace's centre [m] (2) and velocity
-    [max_speed] (2); of all other particles the positions relative to the gripper [rope lengths] (2N - 2),
-    then their velocities [2 m/s] (2N - 2); last the goal relative to the gripper [rope lengths] (2), less
-    2 as the gripper itself is not repeated.
+    `Box(-10, 10, (4 N + 2,), float32)` for N observed particles, the gripper among them (24, or 10
+    with `observation="keypoints"`):
+
+    | Part                                                      | Size    | Unit         |
+    |-----------------------------------------------------------|---------|--------------|
+    | gripper's position relative to the centre of its workspace | 2       | m            |
+    | gripper's velocity                                        | 2       | `max_speed`  |
+    | other particles' positions relative to the gripper        | 2N - 2  | rope lengths |
+    | other particles' velocities                               | 2N - 2  | 2 m/s        |
+    | goal relative to the gripper                              | 2       | rope lengths |
 
     ## Rewards
-    exp(-5 d / L) in [0, 1] for the distance d of the free end from the goal and the rope's length L.
+    exp(-5 d / L) in [0, 1] for the distance d of the free end from the goal, L the rope's length.
 
     ## Starting State
     The rope hangs at rest from a gripper drawn uniformly from its workspace. The goal is uniform
-    over where the free end of a rope hanging from the workspace can be: x in [-1, 1], y in [-0.5, 1] - L.
+    over where the free end of a rope hanging from the workspace can be: x in [-1, 1], y in
+    [-0.5, 1] - L.
 
     ## Episode End
     Truncated after 100 steps. Success: d < 0.05 L at each of the last 10 steps. Terminated only if
@@ -59,7 +66,8 @@ class Rope(Task):
     >>> observation, info = env.reset(seed=1, options={"goal": [0.5, -0.5]})
 
     ```
-    Every field of the class is a keyword. `reset` takes the options `gripper` and `goal` (x, y) [m].
+    Every field of the class is a keyword. `reset` takes the options `gripper` and `goal`, (x, y)
+    [m] each.
 
     ## Version History
     * v0: first version
@@ -121,7 +129,8 @@ class Rope(Task):
         scale = real(1.0 / self.length)
         shape = (x[:, self._observed] - gripper[:, None]) * scale
         motion = v[:, self._observed] * real(0.5)
-        centre = real(0.5) * sum(self.workspace()).astype(x.dtype)
+        lower, upper = self.workspace()
+        centre = (0.5 * (lower + upper)).astype(x.dtype)
         return np.concatenate(
             [
                 gripper - centre,
@@ -153,12 +162,13 @@ class Rope(Task):
         return 0.05 * self.length
 
     def scripted(self, observation: np.ndarray) -> np.ndarray:
-        """Bring the gripper above the goal slowly enough that little sway is left to damp."""
-        tip = observation[:, 2 + 2 * len(self._observed) : 4 + 2 * len(self._observed)] * self.length
-        tip_velocity = observation[:, -4:-2] * 2.0
-        gripper_to_goal = observation[:, -2:] * self.length
-        above = gripper_to_goal + np.array([0.0, self.length])
-        # follow the place above the goal; lean with the swing, which takes energy out of it
-        velocity = 2.5 * above
-        velocity[:, 0] += 0.9 * tip[:, 0] + 0.3 * tip_velocity[:, 0]
+        """Bring the gripper above the goal; follow the free end to take the sway out."""
+        last = 2 * len(self._observed)
+        tip = observation[:, 2 + last : 4 + last] * self.length
+        sway = observation[:, -4:-2] * 2.0 - observation[:, 2:4] * self.max_speed
+        to_goal = observation[:, -2:] * self.length + np.array([0.0, self.length])
+        velocity = np.empty_like(to_goal)
+        ahead = np.clip(to_goal[:, 0], -0.6, 0.6)
+        velocity[:, 0] = 1.5 * ahead + tip[:, 0] + 0.15 * sway[:, 0]
+        velocity[:, 1] = 3.0 * to_goal[:, 1]
         return np.clip(velocity / self.max_speed, -1.0, 1.0).astype(np.float32)

@@ -3,10 +3,11 @@
 Link i holds particle i to particle i + 1 with C_i = |x_i - x_(i+1)| - rest_i. Its gradients are
 +n_i and -n_i, neighbouring links share one particle, so the system of Newton's method is
 
-    (w_i + w_(i+1) + alpha_i/h^2) s_i - w_i (n_i.n_(i-1)) s_(i-1) - w_(i+1) (n_i.n_(i+1)) s_(i+1) = C_i
+    (w_i + w_(i+1) + alpha_i/h^2) s_i - w_i (n_i.n_(i-1)) s_(i-1) - w_(i+1) (n_i.n_(i+1)) s_(i+1) =
+    C_i
 
-and the particles move by x_i -= w_i n_i s_i, x_(i+1) += w_(i+1) n_i s_i (Mueller et al. 2007, eq. 8-11, but for
-all links of the chain at once instead of one after another).
+and the particles move by x_i -= w_i n_i s_i, x_(i+1) += w_(i+1) n_i s_i (Mueller et al. 2007, eq.
+8-11, but for all links of the chain at once instead of one after another).
 """
 
 import numpy as np
@@ -59,7 +60,7 @@ def project_chains(work, model, inverse_h2, iteration):
 
 @kernel
 def project_chains_from_start(work, model, inverse_h2, iteration):
-    """Bring the links to their lengths along their directions at the start of the substep (SHAKE)."""
+    """Bring the links to their lengths along their directions at the substep's start (SHAKE)."""
     offsets, particles = model.chain_offsets, model.chain_particles
     inverse_mass, rest, compliance = model.inverse_mass, model.link_rest, model.link_compliance
     zero_row = row(work, work.shape[0] - 1)
@@ -151,9 +152,9 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
     """Eliminate the link before this one; the direction is that of the start of the substep.
 
     C = (|x_a - x_b|^2 - rest^2) / (2 rest) has the gradient (x_a - x_b)/rest: no square root, and
-    with corrections along the start direction the system is no longer symmetric. Where a link has turned
-    so far within the substep that the start direction does not lead back to its length, its current
-    direction and C = |x_a - x_b| - rest are taken.
+    with corrections along the start direction the system is no longer symmetric. Where a link has
+    turned so far within the substep that the start direction does not lead back to its length, its
+    current direction and C = |x_a - x_b| - rest are taken.
     """
     real = type(mass_a)
     one, zero, half = real(1), real(0), real(0.5)
@@ -258,7 +259,9 @@ def limit_strains(work, model):
         for entry in range(offsets[chain], offsets[chain + 1] - 1):
             if greatest[entry] < np.inf:
                 i, j = particles[entry], particles[entry + 1]
-                _shorten(row(work, i), row(work, j), inverse_mass[i], inverse_mass[j], greatest[entry])
+                _shorten(
+                    row(work, i), row(work, j), inverse_mass[i], inverse_mass[j], greatest[entry]
+                )
 
 
 @kernel

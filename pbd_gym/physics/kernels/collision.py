@@ -115,7 +115,6 @@ def collide_with_self(work, model, pairs, counts, h):
     zero = work.dtype.type(0)
     inverse_mass = model.inverse_mass
     distance = model.collision_distance[0]
-    friction = model.contact[2]
     parting = work.dtype.type(_PARTING_SPEED) * h
     for lane in range(LANES):
         for index in range(counts[lane]):

@@ -22,7 +22,7 @@ def collide_with_walls(work, model):
 
 @kernel
 def read_velocities(work, model, inverse_h, rest_speed):
-    """Read the velocities off the moved positions, v = (x - x_start)/h; at a wall, with restitution.
+    """Read the velocities off the positions, v = (x - x_start)/h; at a wall, with restitution.
 
     rest_speed [m/s]: slower impacts do not bounce, else gravity alone would make resting particles
     hop.
@@ -43,7 +43,10 @@ def read_velocities(work, model, inverse_h, rest_speed):
 
 @kernel
 def _stop_at_walls(at, axis, lower, upper, friction):
-    """Clamp one coordinate; Coulomb friction holds back the others (Macklin et al. 2014, eq. 23-24)."""
+    """Clamp one coordinate; Coulomb friction holds back the others.
+
+    Macklin et al. 2014, eq. 23-24, with one coefficient for both kinds of friction.
+    """
     real = type(friction)
     one, zero = real(1), real(0)
     for lane in range(LANES):
@@ -66,11 +69,11 @@ def _stop_at_walls(at, axis, lower, upper, friction):
 
 @kernel
 def _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h):
-    """Read the velocity of one axis; at a wall it is the restituted one (Mueller et al. 2020, eq. 34).
+    """Read the velocity of one axis; at a wall the restituted one (Mueller et al. 2020, eq. 34).
 
     The speed before the impact is the predicted one, gravity's kick included. Setting the outward
-    velocity instead of reading it off also lets overlapping particles out without a launch. What was
-    moved since the contacts is put back behind the wall.
+    velocity instead of reading it off also lets overlapping particles out without a launch. What
+    was moved since the contacts is put back behind the wall.
     """
     zero = type(restitution)(0)
     for lane in range(LANES):

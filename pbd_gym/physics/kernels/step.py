@@ -1,7 +1,12 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
 from ..compiling import kernel, row
-from .chain import limit_strains, project_chain_velocities, project_chains, project_chains_from_start
+from .chain import (
+    limit_strains,
+    project_chain_velocities,
+    project_chains,
+    project_chains_from_start,
+)
 from .collision import collide_with_self, find_pairs
 from .contact import collide_with_walls, read_velocities
 from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
@@ -25,7 +30,8 @@ def advance(x, v, targets, tiles, work, collision, second_order, model, timing, 
         targets: Where the pins are at the end of the step, (W, P, DIM) [m].
         tiles: First and last + 1 tile of LANES worlds.
         work: Scratch (N + 1, WIDTH); the last row is zero.
-        collision: Scratch of self-collision (reaches, candidate pairs, their counts), or None. What is
+        collision: Scratch of self-collision (reaches, candidate pairs, their counts), or None.
+            What is
             None is known when compiling: the code behind it is not compiled at all.
         second_order: True for RATTLE, None for PBD.
         model: The Parameters.

@@ -85,7 +85,9 @@ def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
         turned = aligned < half * rest * rest
         slope = (square if turned else aligned) * inverse * inverse
         total = (mass_a + mass_b) * slope + alpha
-        scale = stiffness * half * (square * inverse - rest) * inverse / total if total > zero else zero
+        scale = (
+            stiffness * half * (square * inverse - rest) * inverse / total if total > zero else zero
+        )
         for k in range(DIM):
             now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
@@ -128,8 +130,8 @@ def _distance_velocity(a, b, mass_a, mass_b):
 def project_bends(work, model, h, inverse_h2):
     """Draw C = x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta.
 
-    With a dashpot of b [N s/m] beside the spring (Macklin et al. 2016, eq. 26, gamma = alpha b/h), which is
-    what lets a crumpled cloth come to rest.
+    With a dashpot of b [N s/m] beside the spring (Macklin et al. 2016, eq. 26, gamma = alpha b/h),
+    which is what lets a crumpled cloth come to rest.
     """
     inverse_mass, triples = model.inverse_mass, model.bend_triples
     compliance, damping = model.bend_compliance, model.bend_damping
