@@ -13,8 +13,10 @@ BIN := .venv/bin
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
+# Called again without ARGS, training goes on where it was cut off; a finished run is only evaluated.
+RUN := runs/PBDRope-v0-ppo-0
 train: .venv/.installed-train ## train PBDRope-v0: model, learning curve and video
-	$(BIN)/python train/train.py --env pbd_gym:PBDRope-v0 --video $(ARGS)
+	$(BIN)/python train/train.py $(if $(ARGS)$(if $(wildcard $(RUN)/checkpoint.pkl),,new),--env pbd_gym:PBDRope-v0 --video $(ARGS),--resume $(RUN))
 
 test: .venv/.installed-test ## run the tests
 	$(BIN)/python -m pytest $(ARGS)
