@@ -144,9 +144,9 @@ def _check_bends(columns: dict[str, Any]) -> None:
     wrong = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
     _refuse_if(wrong, "bend", triples, "it needs three different particles")
     _check_compliance(columns["bend_compliance"], "bend")
-    damping = columns["bend_damping"]
-    wrong = ~(np.isfinite(damping) & (damping >= 0.0))
-    _refuse_if(wrong, "damping of bend", damping, "it must be finite and at least 0 [N s/m]")
+    friction = columns["bend_friction"]
+    wrong = ~(np.isfinite(friction) & (friction >= 0.0))
+    _refuse_if(wrong, "friction of bend", friction, "it must be finite and at least 0 [N]")
     _check_duplicates(triples, "bend")
 
 

@@ -66,8 +66,8 @@ def _row(typing_context: Any, array: Any, index: Any) -> Any:
     return types.CPointer(array.dtype)(array, types.intp), generate
 
 
-# A bare pointer to a row of a two-dimensional array. A view would be counted as a reference, and the
-# atomic counting of three views per constraint takes longer than the arithmetic on 16 lanes.
+# A bare pointer to a row of a two-dimensional array. A view would be counted as a reference, and
+# the atomic counting of three views per constraint takes longer than the arithmetic on 16 lanes.
 row: Any = operator.getitem if _SETTINGS.DISABLE_JIT else intrinsic(_row)
 
 

@@ -68,7 +68,7 @@ class Model:
         distance_stiffness: (E,) the seed's k in (0, 1].
         bend_triples: (B, 3) particles a, b, c with b between the others.
         bend_compliance: (B,) l^3/EI [m/N].
-        bend_damping: (B,) [N s/m].
+        bend_friction: (B,) limit of the dry friction of bending [N].
         lower: (dim,) walls [m], -inf where there is none.
         upper: (dim,) walls [m], +inf where there is none.
         wall_radius: Distance that particles keep from a wall [m].
@@ -98,7 +98,7 @@ class Model:
     distance_stiffness: np.ndarray
     bend_triples: np.ndarray
     bend_compliance: np.ndarray
-    bend_damping: np.ndarray
+    bend_friction: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
     wall_radius: float
@@ -259,7 +259,9 @@ class ModelBuilder:
         length = self._length(i, j) if rest is None else float(rest)
         self._distances.append((int(i), int(j), length, float(compliance), float(stiffness)))
 
-    def add_bend(self, a: int, b: int, c: int, *, compliance: float, damping: float = 0.0) -> None:
+    def add_bend(
+        self, a: int, b: int, c: int, *, compliance: float, friction: float = 0.0
+    ) -> None:
         """Resist bending at b: the vector x_a - 2 x_b + x_c is drawn to zero (straight rest).
 
         Args:
@@ -267,9 +269,9 @@ class ModelBuilder:
             b: Particle in the middle.
             c: Other neighbour of b.
             compliance: l^3 / EI [m/N] for neighbours l apart and a bending stiffness EI [N m2].
-            damping: Of a dashpot beside that spring [N s/m].
+            friction: Force up to which dry friction holds the bend as it is [N].
         """
-        self._bends.append((int(a), int(b), int(c), float(compliance), float(damping)))
+        self._bends.append((int(a), int(b), int(c), float(compliance), float(friction)))
 
     def set_room(
         self,
@@ -370,7 +372,7 @@ class ModelBuilder:
             "distance_stiffness": distances[:, 2].copy(),
             "bend_triples": np.array([r[:3] for r in self._bends], dtype=np.int64).reshape(-1, 3),
             "bend_compliance": np.array([row[3] for row in self._bends], dtype=np.float64),
-            "bend_damping": np.array([row[4] for row in self._bends], dtype=np.float64),
+            "bend_friction": np.array([row[4] for row in self._bends], dtype=np.float64),
             "collision_particles": self._collision[0].copy(),
         }
         settings: dict[str, Any] = {

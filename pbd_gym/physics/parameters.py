@@ -23,7 +23,7 @@ class Parameters(NamedTuple):
     distance_stiffness: Any
     bend_triples: Any
     bend_compliance: Any
-    bend_damping: Any
+    bend_friction: Any
     lower: Any
     upper: Any
     contact: Any  # (3,): wall radius [m], restitution, friction

@@ -99,7 +99,7 @@ def cloth(
     strain_limit: float = 0.02,
     shear_compliance: float = 1e-3,
     bending_compliance: float = 10.0,
-    bending_damping: float = 0.0,
+    bending_friction: float = 0.0,
     collision_distance: float = 0.0,
     radius: float = 0.002,
 ) -> np.ndarray:
@@ -119,7 +119,7 @@ def cloth(
         strain_limit: Strain beyond which a link is cut short whatever pulls on it.
         shear_compliance: Of a diagonal [m/N].
         bending_compliance: l^3/EI [m/N].
-        bending_damping: Of a dashpot beside each bending spring [N s/m].
+        bending_friction: Force up to which dry friction holds each bend as it is [N].
         collision_distance: That the particles keep from each other [m]; 0 for none.
         radius: Half the drawn thickness [m].
 
@@ -140,7 +140,7 @@ def cloth(
     _shear(builder, grid, shear_compliance)
     for thread in (*grid, *grid.T):
         for a, b, c in zip(thread, thread[1:], thread[2:], strict=False):
-            builder.add_bend(a, b, c, compliance=bending_compliance, damping=bending_damping)
+            builder.add_bend(a, b, c, compliance=bending_compliance, friction=bending_friction)
         builder.add_chain(
             thread,
             compliance=stretch_compliance,

@@ -133,7 +133,7 @@ def _project(work, model, collision, timing, second_order):
     """Step 4: satisfy the constraints. Soft ones first, chains after them, contacts last."""
     for iteration in range(model.iterations):
         if iteration == 0:
-            project_bends(work, model, timing[1], timing[3])
+            project_bends(work, model, timing[3])
             if collision is not None:
                 collide_with_self(work, model, collision[1], collision[2], timing[1])
         if second_order is not None:

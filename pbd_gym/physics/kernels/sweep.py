@@ -127,14 +127,15 @@ def _distance_velocity(a, b, mass_a, mass_b):
 
 
 @kernel
-def project_bends(work, model, h, inverse_h2):
+def project_bends(work, model, inverse_h2):
     """Draw C = x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta.
 
-    With a dashpot of b [N s/m] beside the spring (Macklin et al. 2016, eq. 26, gamma = alpha b/h),
-    which is what lets a crumpled cloth come to rest.
+    Dry friction holds C where it is, with a force of its own limit. It is what real cloth shows when
+    bent to and fro, and what lets a crumpled one come to rest: it stops slow creeping entirely, as
+    a dashpot cannot, and hardly brakes quick motion.
     """
     inverse_mass, triples = model.inverse_mass, model.bend_triples
-    compliance, damping = model.bend_compliance, model.bend_damping
+    compliance, friction = model.bend_compliance, model.bend_friction
     for index in range(triples.shape[0]):
         i, j, k = triples[index, 0], triples[index, 1], triples[index, 2]
         _bend(
@@ -145,22 +146,29 @@ def project_bends(work, model, h, inverse_h2):
             inverse_mass[j],
             inverse_mass[k],
             compliance[index] * inverse_h2,
-            compliance[index] * damping[index] / h,
+            friction[index] / inverse_h2,
         )
 
 
 @kernel
-def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, gamma):
+def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held):
     real = type(mass_a)
     one, two, four, zero = real(1), real(2), real(4), real(0)
-    total = (one + gamma) * (mass_a + four * mass_b + mass_c) + alpha
-    share = one / total if total > zero else zero
+    total = mass_a + four * mass_b + mass_c
+    elastic = one / (total + alpha) if total > zero else zero
+    static = one / total if total > zero else zero
     for lane in range(LANES):
+        square = zero
         for k in range(DIM):
             at, start = POSITION + k * LANES + lane, START + k * LANES + lane
-            bent = a[at] - two * b[at] + c[at]
-            change = bent - (a[start] - two * b[start] + c[start])
-            move = share * (bent + gamma * change)
+            change = a[at] - a[start] - two * (b[at] - b[start]) + c[at] - c[start]
+            square += change * change
+        size = np.sqrt(square)
+        rub = min(held / size, static) if size > zero else zero
+        for k in range(DIM):
+            at, start = POSITION + k * LANES + lane, START + k * LANES + lane
+            change = a[at] - a[start] - two * (b[at] - b[start]) + c[at] - c[start]
+            move = elastic * (a[at] - two * b[at] + c[at]) + rub * change
             a[at] -= mass_a * move
             b[at] += two * mass_b * move
             c[at] -= mass_c * move
