@@ -259,9 +259,7 @@ class ModelBuilder:
         length = self._length(i, j) if rest is None else float(rest)
         self._distances.append((int(i), int(j), length, float(compliance), float(stiffness)))
 
-    def add_bend(
-        self, a: int, b: int, c: int, *, compliance: float, friction: float = 0.0
-    ) -> None:
+    def add_bend(self, a: int, b: int, c: int, *, compliance: float, friction: float = 0.0) -> None:
         """Resist bending at b: the vector x_a - 2 x_b + x_c is drawn to zero (straight rest).
 
         Args:

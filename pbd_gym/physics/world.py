@@ -210,7 +210,7 @@ class World:
         gravity = float(np.sqrt(np.sum(self.model.gravity**2)))
         decay = float(portable.exp(-self.model.damping * h))
         # impacts slower than what gravity gives within two substeps are resting contacts
-        timing = [dt, h, 1.0 / h, 1.0 / h**2, decay, 2.0 * gravity * h]
+        timing = [dt, h, 1.0 / h, 1.0 / h**2, decay, 2.0 * gravity * h, gravity]
         self._timing = np.array(timing, dtype=self.dtype)
         self._substeps = int(substeps)
         self._warm_up()

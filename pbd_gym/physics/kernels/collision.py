@@ -18,8 +18,9 @@ _FARTHEST = 3.0
 _NEIGHBOURHOOD = 3.0
 # Speed at which overlapping particles are let apart [m/s].
 _PARTING_SPEED = 0.1
-# Share of a touching pair's relative motion that is lost in a substep.
-_DRAG = 0.1
+# Force that presses touching particles together, for friction, in units of a particle's weight: what
+# pushes them apart is limited, so the solver does not know it.
+_PRESSURE = 2.0
 
 
 @kernel
@@ -105,7 +106,7 @@ def _square_distance(a, b, quantity, lane, zero):
 
 
 @kernel
-def collide_with_self(work, model, pairs, counts, h):
+def collide_with_self(work, model, pairs, counts, h, gravity):
     """Push the listed pairs apart to the collision distance, with friction between them.
 
     A pair that began the substep closer than that is let apart at `_PARTING_SPEED` only (Macklin et
@@ -116,6 +117,7 @@ def collide_with_self(work, model, pairs, counts, h):
     inverse_mass = model.inverse_mass
     distance = model.collision_distance[0]
     parting = work.dtype.type(_PARTING_SPEED) * h
+    held = model.contact[2] * work.dtype.type(_PRESSURE) * gravity * h * h
     for lane in range(LANES):
         for index in range(counts[lane]):
             i, j = pairs[lane, index, 0], pairs[lane, index, 1]
@@ -131,13 +133,20 @@ def collide_with_self(work, model, pairs, counts, h):
                     move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
                     a[POSITION + k * LANES + lane] += inverse_mass[i] * move
                     b[POSITION + k * LANES + lane] -= inverse_mass[j] * move
-                _drag(a, b, lane, inverse_mass[i], inverse_mass[j])
+                _rub(a, b, lane, inverse_mass[i], inverse_mass[j], held)
 
 
 @kernel
-def _drag(a, b, lane, mass_a, mass_b):
-    """Take a share of a touching pair's relative motion of this substep back."""
-    share = type(mass_a)(_DRAG) / (mass_a + mass_b)
+def _rub(a, b, lane, mass_a, mass_b, held):
+    """Dry friction of a touching pair: take back its relative motion, as far as it can be held."""
+    zero, one = held * 0, held * 0 + 1
+    square = zero
+    for k in range(DIM):
+        at = k * LANES + lane
+        motion = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
+        square += motion * motion
+    size = np.sqrt(square)
+    share = min(held / size, one) / (mass_a + mass_b) if size > zero else zero
     for k in range(DIM):
         at = k * LANES + lane
         motion = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])

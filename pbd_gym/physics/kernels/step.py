@@ -36,7 +36,7 @@ def advance(x, v, targets, tiles, work, collision, second_order, model, timing, 
         second_order: True for RATTLE, None for PBD.
         model: The Parameters.
         timing: dt of the control step [s], h of a substep [s], 1/h, 1/h^2, exp(-damping h), and the
-            speed below which impacts do not bounce [m/s].
+            speed below which impacts do not bounce [m/s], size of gravity [m/s2].
         substeps: Number of substeps.
     """
     for tile in range(tiles[0], tiles[1]):
@@ -135,7 +135,7 @@ def _project(work, model, collision, timing, second_order):
         if iteration == 0:
             project_bends(work, model, timing[3])
             if collision is not None:
-                collide_with_self(work, model, collision[1], collision[2], timing[1])
+                collide_with_self(work, model, collision[1], collision[2], timing[1], timing[6])
         if second_order is not None:
             project_distances_from_start(work, model, timing[3], iteration)
             project_chains_from_start(work, model, timing[3], iteration)
