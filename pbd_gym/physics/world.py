@@ -138,9 +138,8 @@ class World:
         if not self.model.collision_distance:
             return work, None
         colliding = len(self.model.collision_particles)
-        reaches = np.zeros((1, self.lanes), dtype=self.dtype)
         pairs = np.zeros((self.lanes, _PAIRS_PER_PARTICLE * colliding, 2), dtype=np.int32)
-        return work, (reaches, pairs, np.zeros(self.lanes, dtype=np.int64))
+        return work, (pairs, np.zeros(self.lanes, dtype=np.int64))
 
     def __getstate__(self) -> dict[str, Any]:
         kept = ("model", "num_worlds", "dtype", "num_threads", "lanes", "x", "v")

@@ -10,9 +10,6 @@ import numpy as np
 from ..compiling import kernel, row
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 
-# Pairs are sought within this many collision distances at most: faster particles would meet
-# undetected, but a cloth would rather fill the list with pairs that never touch.
-_FARTHEST = 3.0
 # Particles built closer to each other than this many collision distances are neighbours in the
 # body: its own constraints hold them apart.
 _NEIGHBOURHOOD = 3.0
@@ -24,56 +21,51 @@ _PRESSURE = 2.0
 
 
 @kernel
-def find_pairs(work, model, reaches, pairs, counts, dt):
+def find_pairs(work, model, pairs, counts, dt):
     """List, for every lane, the pairs that can come into contact within the control step.
 
-    reaches: (1, LANES) scratch; pairs: (LANES, capacity, 2); counts: (LANES,). What exceeds the
-    capacity is left out (the capacity is several times what a crumpled cloth needs).
+    pairs: (LANES, capacity, 2); counts: (LANES,). What exceeds the capacity is left out (the
+    capacity is several times what a crumpled cloth needs).
     """
-    particles, rest, zero = model.collision_particles, model.positions, work.dtype.type(0)
-    apart = model.collision_distance[0] * work.dtype.type(_NEIGHBOURHOOD)
-    square_reach = row(reaches, 0)
+    particles, rest = model.collision_particles, model.positions
+    distance = model.collision_distance[0]
+    apart = distance * work.dtype.type(_NEIGHBOURHOOD)
     for lane in range(LANES):
         counts[lane] = 0
-        reach = _reach(work, model, lane, dt)
-        square_reach[lane] = reach * reach
     for first in range(particles.shape[0]):
         a = row(work, particles[first])
         for second in range(first + 1, particles.shape[0]):
             b = row(work, particles[second])
-            if _count_near(a, b, square_reach, zero) > 0:
+            if _count_near(a, b, distance, dt) > 0:
                 i, j = particles[first], particles[second]
                 if _far_at_rest(rest, i, j, apart):
-                    _list_pair(a, b, i, j, square_reach, pairs, counts, zero)
+                    _list_pair(a, b, i, j, distance, dt, pairs, counts)
 
 
 @kernel
-def _reach(work, model, lane, dt):
-    """Return the distance within which two particles can meet in dt [m]."""
-    particles = model.collision_particles
-    fastest = work.dtype.type(0)
-    for index in range(particles.shape[0]):
-        at = row(work, particles[index])
-        square = work.dtype.type(0)
-        for k in range(DIM):
-            square += at[VELOCITY + k * LANES + lane] * at[VELOCITY + k * LANES + lane]
-        fastest = max(fastest, square)
-    distance = model.collision_distance[0]
-    travel = work.dtype.type(2) * np.sqrt(fastest) * dt
-    return distance + min(travel, work.dtype.type(_FARTHEST - 1.0) * distance)
-
-
-@kernel
-def _count_near(a, b, square_reach, zero):
-    """Count the lanes in which two particles are within reach."""
+def _count_near(a, b, distance, dt):
+    """Count the lanes in which two particles can meet."""
     near = 0
     for lane in range(LANES):
-        square = zero
-        for k in range(DIM):
-            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
-            square += delta * delta
-        near += 1 if square < square_reach[lane] else 0
+        near += 1 if _excess(a, b, lane, distance, dt) < distance * 0 else 0
     return near
+
+
+@kernel
+def _excess(a, b, lane, distance, dt):
+    """Return a square [m2] that is negative where two particles can meet within dt.
+
+    They can where |x_a - x_b| < distance + |v_a - v_b| dt; (p + q)^2 <= 2 p^2 + 2 q^2 saves the root.
+    """
+    square, travel = distance * 0, distance * 0
+    for k in range(DIM):
+        at = k * LANES + lane
+        delta = a[POSITION + at] - b[POSITION + at]
+        motion = (a[VELOCITY + at] - b[VELOCITY + at]) * dt
+        square += delta * delta
+        travel += motion * motion
+    reach = min(travel, distance * distance * 2) + distance * distance
+    return square - reach - reach
 
 
 @kernel
@@ -86,10 +78,10 @@ def _far_at_rest(rest, i, j, apart):
 
 
 @kernel
-def _list_pair(a, b, i, j, square_reach, pairs, counts, zero):
-    """Add a pair to the lists of the lanes in which it is within reach."""
+def _list_pair(a, b, i, j, distance, dt, pairs, counts):
+    """Add a pair to the lists of the lanes in which it can meet."""
     for lane in range(LANES):
-        near = _square_distance(a, b, POSITION, lane, zero) < square_reach[lane]
+        near = _excess(a, b, lane, distance, dt) < distance * 0
         if near and counts[lane] < pairs.shape[1]:
             pairs[lane, counts[lane], 0] = i
             pairs[lane, counts[lane], 1] = j

@@ -30,7 +30,7 @@ def advance(x, v, targets, tiles, work, collision, second_order, model, timing, 
         targets: Where the pins are at the end of the step, (W, P, DIM) [m].
         tiles: First and last + 1 tile of LANES worlds.
         work: Scratch (N + 1, WIDTH); the last row is zero.
-        collision: Scratch of self-collision (reaches, candidate pairs, their counts), or None.
+        collision: Scratch of self-collision (candidate pairs, their counts), or None.
             What is
             None is known when compiling: the code behind it is not compiled at all.
         second_order: True for RATTLE, None for PBD.
@@ -43,7 +43,7 @@ def advance(x, v, targets, tiles, work, collision, second_order, model, timing, 
         _load(x, v, tile, work)
         _aim_pins(x, targets, tile, work, model, timing)
         if collision is not None:
-            find_pairs(work, model, collision[0], collision[1], collision[2], timing[0])
+            find_pairs(work, model, collision[0], collision[1], timing[0])
         for substep in range(substeps):
             remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
             _predict(work, model, timing, second_order)
@@ -135,7 +135,7 @@ def _project(work, model, collision, timing, second_order):
         if iteration == 0:
             project_bends(work, model, timing[3])
             if collision is not None:
-                collide_with_self(work, model, collision[1], collision[2], timing[1], timing[6])
+                collide_with_self(work, model, collision[0], collision[1], timing[1], timing[6])
         if second_order is not None:
             project_distances_from_start(work, model, timing[3], iteration)
             project_chains_from_start(work, model, timing[3], iteration)
