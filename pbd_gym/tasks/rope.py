@@ -162,13 +162,13 @@ class Rope(Task):
         return 0.05 * self.length
 
     def scripted(self, observation: np.ndarray) -> np.ndarray:
-        """Bring the gripper above the goal; follow the free end to take the sway out."""
-        last = 2 * len(self._observed)
-        tip = observation[:, 2 + last : 4 + last] * self.length
-        sway = observation[:, -4:-2] * 2.0 - observation[:, 2:4] * self.max_speed
-        to_goal = observation[:, -2:] * self.length + np.array([0.0, self.length])
-        velocity = np.empty_like(to_goal)
-        ahead = np.clip(to_goal[:, 0], -0.6, 0.6)
-        velocity[:, 0] = 1.5 * ahead + tip[:, 0] + 0.15 * sway[:, 0]
-        velocity[:, 1] = 3.0 * to_goal[:, 1]
+        """Bring the gripper above the goal; follow the rope's middle to take the sway out."""
+        count = 2 * len(self._observed)
+        shape = (len(observation), len(self._observed), 2)
+        hang = observation[:, 4 : 4 + count].reshape(shape).mean(axis=1) * self.length
+        drift = observation[:, 4 + count : 4 + 2 * count].reshape(shape).mean(axis=1) * 2.0
+        drift -= observation[:, 2:4] * self.max_speed
+        velocity = observation[:, -2:] * self.length + np.array([0.0, self.length])
+        velocity *= (1.5, 3.0)
+        velocity[:, 0] += 4.0 * hang[:, 0] - 0.2 * drift[:, 0]
         return np.clip(velocity / self.max_speed, -1.0, 1.0).astype(np.float32)

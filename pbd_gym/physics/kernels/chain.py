@@ -255,7 +255,10 @@ def limit_strains(work, model):
     """
     offsets, particles = model.chain_offsets, model.chain_particles
     inverse_mass, greatest = model.inverse_mass, model.link_greatest_length
-    for chain in range(offsets.shape[0] - 1):
+    chains = offsets.shape[0] - 1
+    for turn in range(2 * chains):
+        # there and back, so that no thread is always the last
+        chain = turn if turn < chains else 2 * chains - 1 - turn
         for entry in range(offsets[chain], offsets[chain + 1] - 1):
             if greatest[entry] < np.inf:
                 i, j = particles[entry], particles[entry + 1]

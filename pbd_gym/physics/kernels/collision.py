@@ -15,8 +15,8 @@ from .layout import DIM, LANES, POSITION, START, VELOCITY
 _NEIGHBOURHOOD = 3.0
 # Speed at which overlapping particles are let apart [m/s].
 _PARTING_SPEED = 0.1
-# Force that presses touching particles together, for friction, in units of a particle's weight: what
-# pushes them apart is limited, so the solver does not know it.
+# Force that presses touching particles together, for friction, in units of a particle's weight:
+# what pushes them apart is limited, so the solver does not know it.
 _PRESSURE = 2.0
 
 
