@@ -26,7 +26,8 @@ def drive_pins(
     A pin's velocity follows the desired one with at most the maximal acceleration along each axis.
     It brakes in time to stop at the edges of the workspace: from u the way to a stop is
     u dt + u^2/(2 a), which gives the greatest speed at a distance. Two pins stay within the span of
-    their body, their middle where it would have been.
+    their body, their middle where it would have been; where they are stopped by it, the bound on
+    their acceleration does not hold.
 
     Args:
         x: Positions (n, N, dim) [m].
@@ -55,6 +56,7 @@ def drive_pins(
                 targets[world, index, axis] = target
         if count == 2:
             _keep_together(targets[world], limits[3])
+            _slow_down(x[world], pins, targets[world], max_speed * dt)
         short[world] = 0
         for index in range(count):
             for axis in range(dim):
@@ -94,3 +96,21 @@ def _keep_together(targets: Any, span: Any) -> None:
             reach = (targets[1, axis] - targets[0, axis]) * share / 2
             targets[0, axis] = middle - reach
             targets[1, axis] = middle + reach
+
+
+@kernel
+def _slow_down(x: Any, pins: Any, targets: Any, longest: Any) -> None:
+    """Shorten the moves of all pins alike, so that none is longer than it may be along an axis.
+
+    Between where the pins are and where they were to go, span and workspace hold too: both are
+    convex.
+    """
+    move = longest * 0
+    for index in range(pins.shape[0]):
+        for axis in range(targets.shape[1]):
+            move = max(move, abs(targets[index, axis] - x[pins[index], axis]))
+    if move > longest:
+        for index in range(pins.shape[0]):
+            for axis in range(targets.shape[1]):
+                at = x[pins[index], axis]
+                targets[index, axis] = at + (targets[index, axis] - at) * (longest / move)

@@ -55,7 +55,8 @@ def _count_near(a, b, distance, dt):
 def _excess(a, b, lane, distance, dt):
     """Return a square [m2] that is negative where two particles can meet within dt.
 
-    They can where |x_a - x_b| < distance + |v_a - v_b| dt; (p + q)^2 <= 2 p^2 + 2 q^2 saves the root.
+    They can where |x_a - x_b| < distance + |v_a - v_b| dt, and (p + q)^2 <= 2 p^2 + 2 q^2 saves
+    the root.
     """
     square, travel = distance * 0, distance * 0
     for k in range(DIM):
