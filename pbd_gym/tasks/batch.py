@@ -168,13 +168,13 @@ class Batch:
 
     def _put_back_diverged(self) -> np.ndarray:
         """Return which worlds left all bounds; they are put back to where the model was built."""
-        x = self.world.x
+        x, bound = self.world.x, self.task.sanity_bound
         # written so that NaN counts as out of bounds
-        within = np.abs(x) < self.task.sanity_bound
-        diverged = np.asarray(~within.all(axis=(1, 2)))
-        if diverged.any():
-            x[diverged] = self.task.model.positions
-            self.world.v[diverged] = 0.0
+        if x.max() < bound and x.min() > -bound:
+            return np.zeros(len(x), dtype=bool)
+        diverged = np.asarray(~(np.abs(x) < bound).all(axis=(1, 2)))
+        x[diverged] = self.task.model.positions
+        self.world.v[diverged] = 0.0
         return diverged
 
     def observe(self) -> np.ndarray:

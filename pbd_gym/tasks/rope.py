@@ -117,10 +117,16 @@ class Rope(Task):
         return Start(x, np.zeros_like(x), {"goal": quantities["goal"].astype(np.float32)})
 
     @cached_property
-    def _observed(self) -> np.ndarray:
-        """Indices of the observed particles below the gripper."""
-        count = self.particles if self.observation == "particles" else 10
-        return np.round(np.linspace(0, self.particles - 1, count)).astype(np.int64)[1:]
+    def _observed(self) -> np.ndarray | slice:
+        """Where the observed particles below the gripper stand."""
+        if self.observation == "particles":
+            return slice(1, None)  # no index array: that would copy twice
+        return np.round(np.linspace(0, self.particles - 1, 10)).astype(np.int64)[1:]
+
+    @property
+    def _num_observed(self) -> int:
+        """Number of observed particles below the gripper."""
+        return (self.particles if self.observation == "particles" else 10) - 1
 
     def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
         """Return gripper, rope relative to the gripper, and goal relative to the gripper."""
@@ -163,8 +169,8 @@ class Rope(Task):
 
     def scripted(self, observation: np.ndarray) -> np.ndarray:
         """Bring the gripper above the goal; follow the rope's middle to take the sway out."""
-        count = 2 * len(self._observed)
-        shape = (len(observation), len(self._observed), 2)
+        count = 2 * self._num_observed
+        shape = (len(observation), self._num_observed, 2)
         hang = observation[:, 4 : 4 + count].reshape(shape).mean(axis=1) * self.length
         drift = observation[:, 4 + count : 4 + 2 * count].reshape(shape).mean(axis=1) * 2.0
         drift -= observation[:, 2:4] * self.max_speed
