@@ -131,7 +131,7 @@ def project_bends(work, model, inverse_h2):
     """Draw C = x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta.
 
     Dry friction holds C where it is, with a force of its own limit. It is what real cloth shows
-    when bent to and fro, and what lets a crumpled one come to rest: it stops slow creeping
+    when bent back and forth, and what lets a crumpled one come to rest: it stops slow creeping
     entirely, as a dashpot cannot, and hardly brakes quick motion.
     """
     inverse_mass, triples = model.inverse_mass, model.bend_triples
