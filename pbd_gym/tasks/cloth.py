@@ -55,7 +55,7 @@ class Cloth(Task):
 
     ## Starting State
     The cloth hangs at rest. The grippers' middle is drawn from x, y in [-0.1, 0.1] m, their
-    height from [0.7, 0.8] m and the yaw of the line between them from [-0.3, 0.3] rad; so are the
+    height from [0.68, 0.74] m and the yaw of the line between them from [-0.3, 0.3] rad; so are the
     centre and the yaw of the square.
 
     ## Episode End
@@ -132,7 +132,7 @@ class Cloth(Task):
         near, far = np.full(2, 0.1), np.full(2, 0.4)
         return {
             "middle": draw(-near, near, -far, far),
-            "height": draw(self.side + 0.1, self.side + 0.2, self.side + 0.1, 1.0),
+            "height": draw(self.side + 0.08, self.side + 0.14, self.side + 0.08, 1.0),
             "yaw": draw(-0.3, 0.3, -_PI, _PI),
             "goal": draw(-near, near, -far, far),
             "goal_yaw": draw(-0.3, 0.3, -_PI, _PI),
