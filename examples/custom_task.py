@@ -28,7 +28,7 @@ class Crane(Task):
     than 0.1 m/s for 15 steps in a row.
     """
 
-    particles: int = number(8, 2, 100)  # type: ignore[assignment]
+    particles: int = number(8, 2, 100)
     length: float = number(1.0, 0.1, 10.0, "m")
     rope_mass: float = number(0.1, 1e-3, 10.0, "kg")
     load: float = number(10.0, 1e-2, 1e3, "kg")

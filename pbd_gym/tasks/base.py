@@ -89,7 +89,7 @@ class Task:
     """
 
     control_rate: float = number(30.0, 1.0, 1000.0, "Hz")
-    substeps: int = number(10, 1, 1000)  # type: ignore[assignment]
+    substeps: int = number(10, 1, 1000)
     max_speed: float = number(2.0, 1e-3, 100.0, "m/s")
     max_acceleration: float = number(20.0, 1e-3, 1000.0, "m/s2")
     gravity: float = number(9.81, 0.0, 100.0, "m/s2")

@@ -77,7 +77,7 @@ class Cloth(Task):
     * v0: first version
     """
 
-    particles: int = number(12, 4, 40)  # type: ignore[assignment]
+    particles: int = number(12, 4, 40)
     side: float = number(0.6, 0.1, 0.6, "m")
     mass: float = number(0.15, 1e-3, 1e2, "kg")
     stretch_compliance: float = number(1e-4, 0.0, 1.0, "m/N")
@@ -85,7 +85,7 @@ class Cloth(Task):
     bending_compliance: float = number(10.0, 0.0, 1e6, "m/N")
     bending_friction: float = number(0.003, 0.0, 1e3, "N")
     friction: float = number(0.5, 0.0, 10.0)
-    substeps: int = number(16, 1, 1000)  # type: ignore[assignment]
+    substeps: int = number(16, 1, 1000)
     max_speed: float = number(1.0, 1e-3, 100.0, "m/s")
     max_acceleration: float = number(10.0, 1e-3, 1000.0, "m/s2")
     damping: float = number(1.0, 0.0, 100.0, "1/s")

@@ -70,12 +70,12 @@ class Pendulum(Task):
     * v0: first version
     """
 
-    links: int = number(1, 1, 5)  # type: ignore[assignment]
+    links: int = number(1, 1, 5)
     length: float = number(1.0, 0.1, 10.0, "m")
     mass: float = number(1.0, 1e-3, 1e3, "kg")
     rail: float = number(1.5, 0.1, 100.0, "m")
     control_rate: float = number(50.0, 1.0, 1000.0, "Hz")
-    substeps: int = number(10, 1, 1000)  # type: ignore[assignment]
+    substeps: int = number(10, 1, 1000)
     max_speed: float = number(3.0, 1e-3, 100.0, "m/s")
     max_acceleration: float = number(30.0, 1e-3, 1000.0, "m/s2")
     damping: float = number(0.0, 0.0, 100.0, "1/s")

@@ -73,7 +73,7 @@ class Rope(Task):
     * v0: first version
     """
 
-    particles: int = number(24, 10, 1000)  # type: ignore[assignment]
+    particles: int = number(24, 10, 1000)
     length: float = number(1.0, 0.1, 1.0, "m")
     mass: float = number(0.2, 1e-3, 1e3, "kg")
     compliance: float = number(0.0, 0.0, 1.0, "m/N")
