@@ -167,12 +167,12 @@ def test_a_strain_limit_is_not_negative(limit):
     )
 
 
-@pytest.mark.parametrize("damping", [-0.1, NAN, INF])
-def test_the_damping_of_a_bend_is_finite_and_not_negative(damping):
+@pytest.mark.parametrize("friction", [-0.1, NAN, INF])
+def test_the_friction_of_a_bend_is_finite_and_not_negative(friction):
     builder = line()
     builder.add_bend(0, 1, 2, compliance=1.0)
-    builder.add_bend(1, 2, 3, compliance=1.0, damping=damping)
-    refused(builder, f"damping of bend 1 is {damping}")
+    builder.add_bend(1, 2, 3, compliance=1.0, friction=friction)
+    refused(builder, f"friction of bend 1 is {friction}")
 
 
 @pytest.mark.parametrize("stiffness", [0.0, -0.5, 1.0001, NAN])

@@ -65,7 +65,7 @@ def _excess(a, b, lane, distance, dt):
         motion = (a[VELOCITY + at] - b[VELOCITY + at]) * dt
         square += delta * delta
         travel += motion * motion
-    reach = min(travel, distance * distance * 2) + distance * distance
+    reach = travel + distance * distance
     return square - reach - reach
 
 
