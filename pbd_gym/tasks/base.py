@@ -156,7 +156,7 @@ class Task:
         raise NotImplementedError
 
     def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
-        """Return observations (n, size) in the state's dtype, before clipping."""
+        """Return observations (n, size) in the state's dtype, a fresh array, before clipping."""
         raise NotImplementedError
 
     def judge(

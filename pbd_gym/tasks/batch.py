@@ -44,6 +44,8 @@ class Batch:
         self.variables = {
             name: np.repeat(value, num_worlds, axis=0) for name, value in fresh.items()
         }
+        space = task.observation_space
+        self._least, self._greatest = space.low[0], space.high[0]
         self._draws = sum(len(spec.low) for spec in task.draws.values())
 
     def reset(
@@ -179,9 +181,9 @@ class Batch:
 
     def observe(self) -> np.ndarray:
         """Return the observations, a fresh float32 array (W, size) within the space's bounds."""
-        space = self.task.observation_space
         observation = self.task.observe(self.world.x, self.world.v, self.variables)
-        return np.minimum(np.maximum(observation, space.low[0]), space.high[0])
+        np.maximum(observation, self._least, out=observation)
+        return np.minimum(observation, self._greatest, out=observation)
 
     def get_state(self) -> tuple[Snapshot, Variables]:
         """Return copies of all that a continuation depends on."""

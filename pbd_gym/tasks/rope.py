@@ -130,23 +130,26 @@ class Rope(Task):
 
     def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
         """Return gripper, rope relative to the gripper, and goal relative to the gripper."""
-        worlds, real = len(x), x.dtype.type
-        gripper = x[:, 0]
-        scale = real(1.0 / self.length)
-        shape = (x[:, self._observed] - gripper[:, None]) * scale
-        motion = v[:, self._observed] * real(0.5)
+        worlds, count, gripper = len(x), self._num_observed, x[:, 0]
+        real, scale = x.dtype.type, x.dtype.type(1.0 / self.length)
+        observation = np.empty((worlds, 4 * count + 6), dtype=x.dtype)
+        observation[:, 0:2] = gripper - self._centre
+        observation[:, 2:4] = v[:, 0] * real(1.0 / self.max_speed)
+        shape = observation[:, 4 : 4 + 2 * count].reshape(worlds, count, 2)  # views, not copies
+        motion = observation[:, 4 + 2 * count : -2].reshape(worlds, count, 2)
+        for axis in range(2):  # long inner loops over particles, not short ones over axes
+            along = x[:, self._observed, axis]
+            np.subtract(along, gripper[:, axis, None], out=shape[:, :, axis])
+        shape *= scale
+        np.multiply(v[:, self._observed], real(0.5), out=motion)
+        observation[:, -2:] = (variables["goal"] - gripper) * scale
+        return observation
+
+    @cached_property
+    def _centre(self) -> np.ndarray:
+        """Middle of the gripper's workspace, (2,) [m]."""
         lower, upper = self.workspace()
-        centre = (0.5 * (lower + upper)).astype(x.dtype)
-        return np.concatenate(
-            [
-                gripper - centre,
-                v[:, 0] * real(1.0 / self.max_speed),
-                shape.reshape(worlds, -1),
-                motion.reshape(worlds, -1),
-                (variables["goal"] - gripper) * scale,
-            ],
-            axis=1,
-        )
+        return (0.5 * (lower + upper)).astype(np.float32)
 
     def judge(
         self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
