@@ -70,7 +70,7 @@ def test_crumpled_cloths_come_to_rest_below_their_held_corners() -> None:
         env.step(action.reshape(worlds, 6).astype(np.float32))
     for _ in range(resting):
         env.step(np.zeros((worlds, 6), dtype=np.float32))
-    # The aim is all of them. 2 s after the hands stop, 80 to 90 % are below 3 cm/s (79.7 % with this
+    # The aim is all of them. 2 s after the hands stop, 80 to 90 % are below 3 cm/s (79.7 % for this
     # seed); in the others a fold still slides. The bound guards what is reached, it is not the aim.
     assert (speeds(env) < 0.03).mean() >= 0.7
     assert np.median(speeds(env)) < 0.01
