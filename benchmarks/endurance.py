@@ -34,7 +34,7 @@ def endure(name: str, steps: int, worlds: int, seed: int) -> str:
         ends = x[:, pairs].astype(np.float64)
         strain = np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2)) / rest - 1.0
         stretch, compression = max(stretch, strain.max()), min(compression, strain.min())
-        lowest = min(lowest, float((x - model.lower).min()))
+        lowest = min(lowest, float((x - model.room.lower).min()))
         greatest = max(greatest, float(np.abs(observation).max()))
         diverged += int(terminated.sum())
     env.close()

@@ -109,7 +109,7 @@ def cache_folder() -> Path | None:
     NUMBA_CACHE_DIR is taken before the user's cache folder, then the system's temporary folder.
     """
     digest = hashlib.sha256()
-    for source in (*sorted(_KERNELS.glob("*.py")), Path(__file__).with_name("parameters.py")):
+    for source in (*sorted(_KERNELS.glob("*.py")), Path(__file__).with_name("tables.py")):
         digest.update(source.read_bytes())
     target = (
         numba.__version__,

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics.model import Linkage, ModelBuilder, Sheet, Strand
+from pbd_gym.physics.bodies import Linkage, Sheet, Strand
+from pbd_gym.physics.builder import ModelBuilder
 
 
 def rope(
@@ -101,6 +102,7 @@ def cloth(
     bending_compliance: float = 10.0,
     bending_friction: float = 0.0,
     collision_distance: float = 0.0,
+    collision_friction: float = 0.0,
     radius: float = 0.002,
 ) -> np.ndarray:
     """Add a flat rectangular cloth woven of threads; nothing is pinned.
@@ -121,6 +123,7 @@ def cloth(
         bending_compliance: l^3/EI [m/N].
         bending_friction: Force up to which dry friction holds each bend as it is [N].
         collision_distance: That the particles keep from each other [m]; 0 for none.
+        collision_friction: Coulomb coefficient between particles.
         radius: Half the drawn thickness [m].
 
     Returns:
@@ -147,7 +150,7 @@ def cloth(
             strain_limit=strain_limit,
         )
     if collision_distance > 0.0:
-        builder.set_self_collision(indices, collision_distance)
+        builder.set_self_collision(indices, collision_distance, friction=collision_friction)
     builder.add_body(Sheet(tuple(tuple(map(int, row)) for row in grid), radius))
     return grid
 

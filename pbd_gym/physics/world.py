@@ -12,7 +12,7 @@ import numpy as np
 
 from pbd_gym.physics import compiling, portable
 from pbd_gym.physics.model import Model
-from pbd_gym.physics.parameters import Parameters
+from pbd_gym.physics.tables import Parameters, Timing, as_read
 
 # One world runs in scalar code. Below this number of worlds a tile of lanes would be mostly empty.
 _FEWEST_FOR_LANES = 8
@@ -123,7 +123,7 @@ class World:
     def _prepare(self) -> None:
         """Load the kernels and allocate their scratch, one set per thread."""
         self._kernels = compiling.load_kernels(self.model.dim, self.lanes)
-        self._parameters = _parameters(self.model, self.dtype)
+        self._parameters = as_read(_parameters(self.model), self.dtype)
         tiles = -(-self.num_worlds // self.lanes)
         bounds = np.linspace(0, tiles, self.num_threads + 1).astype(np.int64)
         self._shares = [
@@ -135,9 +135,9 @@ class World:
         """Return the scratch of one thread: work, and that of self-collision or None."""
         shape = (self.model.num_particles + 1, self._kernels.WIDTH)
         work = np.zeros(shape, dtype=self.dtype)
-        if not self.model.collision_distance:
+        if self.model.self_collision is None:
             return work, None
-        colliding = len(self.model.collision_particles)
+        colliding = len(self.model.self_collision.particles)
         pairs = np.zeros((self.lanes, _PAIRS_PER_PARTICLE * colliding, 2), dtype=np.int32)
         return work, (pairs, np.zeros(self.lanes, dtype=np.int64))
 
@@ -184,13 +184,11 @@ class World:
             future.result()
 
     def _advance(self, targets: np.ndarray, share: tuple[Any, ...]) -> None:
-        second_order = True if self.model.integrator == "rattle" else None
         self._kernels.advance(
             self.x,
             self.v,
             targets,
             *share,
-            second_order,
             self._parameters,
             self._timing,
             self._substeps,
@@ -209,8 +207,8 @@ class World:
         gravity = float(np.sqrt(np.sum(self.model.gravity**2)))
         decay = float(portable.exp(-self.model.damping * h))
         # impacts slower than what gravity gives within two substeps are resting contacts
-        timing = [dt, h, 1.0 / h, 1.0 / h**2, decay, 2.0 * gravity * h, gravity]
-        self._timing = np.array(timing, dtype=self.dtype)
+        timing = Timing(dt, h, 1.0 / h, 1.0 / h**2, decay, 2.0 * gravity * h, gravity)
+        self._timing = as_read(timing, self.dtype)
         self._substeps = int(substeps)
         self._warm_up()
         self._timing_key = (dt, substeps)
@@ -223,7 +221,7 @@ class World:
             f"{self.lanes} lanes",
             self.dtype.name,
         ]
-        if self.model.collision_distance:
+        if self.model.self_collision is not None:
             variant.append("self-collision")
         done = compiling.announce_compilation(", ".join(variant))
         none = np.zeros(2, dtype=np.int64)
@@ -256,22 +254,18 @@ class World:
         self.v[:] = snapshot.v
 
 
-def _parameters(model: Model, dtype: np.dtype) -> Parameters:
-    """Return the model's arrays in the state's dtype, as the kernels read them."""
-    contact = np.array([model.wall_radius, model.restitution, model.friction])
-    own = {
-        "contact": contact,
-        "collision_distance": np.array([model.collision_distance]),
-        "iterations": int(model.iterations),
-    }
-    values = {}
-    for name in Parameters._fields:
-        value = own[name] if name in own else getattr(model, name)
-        if isinstance(value, np.ndarray):
-            # copies: a read-only array would be another type to compile for
-            value = value.astype(dtype if value.dtype.kind == "f" else np.int64)
-        values[name] = value
-    return Parameters(**values)
+def _parameters(model: Model) -> Parameters:
+    """Return what of a model the kernels read."""
+    return Parameters(
+        particles=model.particles,
+        chains=model.chains,
+        distances=model.distances,
+        bends=model.bends,
+        room=model.room,
+        self_collision=model.self_collision,
+        second_order=True if model.integrator == "rattle" else None,
+        iterations=model.iterations,
+    )
 
 
 def _is_whole(value: Any) -> TypeGuard[int]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.model import Body, Linkage, Model, Sheet
+from pbd_gym.physics.bodies import Body, Linkage, Sheet
+from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import OrthographicCamera
 from pbd_gym.rendering.canvas import Canvas
@@ -153,7 +154,7 @@ class PlanarPainter:
         canvas = self._canvas
         far = np.array(canvas.size) * 2.0
         for axis in (0, 1):
-            for wall, outside in ((self._model.lower, -1), (self._model.upper, 1)):
+            for wall, outside in ((self._model.room.lower, -1), (self._model.room.upper, 1)):
                 if not np.isfinite(wall[axis]):
                     continue
                 place = np.where(np.arange(2) == axis, wall[axis], self.camera.centre)

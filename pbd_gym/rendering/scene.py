@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pbd_gym.physics.model import Body, Linkage, Model
+from pbd_gym.physics.bodies import Body, Linkage
+from pbd_gym.physics.model import Model
 from pbd_gym.rendering.curves import finite_rows
 
 Segment = tuple["Sequence[float] | np.ndarray", "Sequence[float] | np.ndarray"]

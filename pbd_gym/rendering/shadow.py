@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.model import Body, Linkage, Model, Sheet
+from pbd_gym.physics.bodies import Body, Linkage, Sheet
+from pbd_gym.physics.model import Model
 from pbd_gym.rendering.canvas import ribbon
 from pbd_gym.rendering.curves import finite_runs
 from pbd_gym.rendering.scene import bob_radius, particles_of
@@ -22,7 +23,7 @@ def shadow_patches(model: Model, x: np.ndarray, light: np.ndarray) -> tuple[np.n
         Quadrilaterals on the floor (Q, 4, 3) [m], and how high above the floor each was cast from
         (Q,) [m].
     """
-    floor = float(model.lower[2])
+    floor = float(model.room.lower[2])
     height = np.maximum(x[:, 2] - floor, 0.0)
     dropped = x - height[:, None] / light[2] * light
     dropped[:, 2] = floor

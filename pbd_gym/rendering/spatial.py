@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.model import Body, Linkage, Model, Sheet
+from pbd_gym.physics.bodies import Body, Linkage, Sheet
+from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import PerspectiveCamera
 from pbd_gym.rendering.canvas import Canvas
@@ -67,7 +68,7 @@ class SpatialPainter:
                 self._paint_rim(sheet, goal)
             for centre in goal[singles]:
                 self._paint_goal(centre, goal_radius)
-        if np.isfinite(model.lower[2]):
+        if np.isfinite(model.room.lower[2]):
             self._paint_shadows(x)
         self._paint_bodies(x, singles)
         if goal is not None:
@@ -145,12 +146,12 @@ class SpatialPainter:
     ) -> None:
         canvas, model = self._canvas, self._model
         tile = round_length(self._extent / 6.0)
-        room = (model.lower, model.upper)
+        room = (model.room.lower, model.room.upper)
         canvas.paste(floor_pixels(self.camera, canvas.size, view, room, tile))
         for rail in rails:
             ends, _ = self.camera.project(np.array(rail, dtype=np.float64))
             canvas.stroke(ends, 4.0 * canvas.unit, palette.LIGHT_STEEL)
-        if np.isfinite(model.lower[2]):
+        if np.isfinite(model.room.lower[2]):
             place = (48.0 * canvas.unit, canvas.size[1] - 16.0 * canvas.unit)
             canvas.text(f"tile {tile:g} m", place, 19.0 * canvas.unit, palette.INK)
         canvas.keep_as_background()

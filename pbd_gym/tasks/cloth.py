@@ -109,6 +109,7 @@ class Cloth(Task):
             bending_friction=self.bending_friction,
             strain_limit=0.01,
             collision_distance=0.7 * spacing,
+            collision_friction=self.friction,
         )
         builder.pin([grid[0, 0], grid[0, -1]])
         builder.set_ground(0.0, friction=self.friction, radius=_TABLE_GAP)

@@ -115,7 +115,7 @@ def test_a_particle_inside_a_wall_is_let_out_without_a_launch():
 
 def test_a_rope_falls_together_on_the_ground_and_rests():
     model = rope_2d(8, length=0.5, damping=1.0)
-    assert np.isinf(model.lower).all()
+    assert np.isinf(model.room.lower).all()
     room = ([-np.inf, -0.7], [np.inf, np.inf], {"friction": 0.5})
     pile = particles_2d(model.positions, room=room)
     state = world(pile)

@@ -274,7 +274,7 @@ def test_a_builder_that_was_refused_can_be_corrected():
     builder.set_ground(-1.0, restitution=2.0)
     refused(builder, "restitution is 2.0")
     builder.set_ground(-1.0, restitution=0.5)
-    assert builder.build().restitution == 0.5
+    assert builder.build().room.restitution == 0.5
 
 
 def test_a_model_cannot_be_changed():

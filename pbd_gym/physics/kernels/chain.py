@@ -25,6 +25,7 @@ from .layout import (
     START,
     VELOCITY,
 )
+from .masses import in_lane, inverse_mass_of
 
 # A pivot below this share of the diagonal means that the links fight over a taut line between two
 # pins; the floor keeps their multipliers finite.
@@ -34,10 +35,10 @@ _FREE = 1e30
 
 
 @kernel
-def project_chains(work, model, inverse_h2, iteration):
+def project_chains(work, masses, chains, inverse_h2, iteration):
     """Bring the links of every chain to their lengths, along their current directions."""
-    offsets, particles = model.chain_offsets, model.chain_particles
-    inverse_mass, rest, compliance = model.inverse_mass, model.link_rest, model.link_compliance
+    offsets, particles = chains.offsets, chains.particles
+    rest, compliance = chains.rest, chains.compliance
     zero_row = row(work, work.shape[0] - 1)
     for chain in range(offsets.shape[0] - 1):
         first, last = offsets[chain], offsets[chain + 1] - 1
@@ -49,20 +50,20 @@ def project_chains(work, model, inverse_h2, iteration):
                 before,
                 link,
                 row(work, j),
-                inverse_mass[i],
-                inverse_mass[j],
+                inverse_mass_of(masses, i),
+                inverse_mass_of(masses, j),
                 rest[entry],
                 _stiffened(compliance, entry, inverse_h2, iteration),
             )
             before = link
-        _back_substitute(work, particles, inverse_mass, first, last, POSITION)
+        _back_substitute(work, masses, particles, first, last, POSITION)
 
 
 @kernel
-def project_chains_from_start(work, model, inverse_h2, iteration):
+def project_chains_from_start(work, masses, chains, inverse_h2, iteration):
     """Bring the links to their lengths along their directions at the substep's start (SHAKE)."""
-    offsets, particles = model.chain_offsets, model.chain_particles
-    inverse_mass, rest, compliance = model.inverse_mass, model.link_rest, model.link_compliance
+    offsets, particles = chains.offsets, chains.particles
+    rest, compliance = chains.rest, chains.compliance
     zero_row = row(work, work.shape[0] - 1)
     for chain in range(offsets.shape[0] - 1):
         first, last = offsets[chain], offsets[chain + 1] - 1
@@ -74,20 +75,20 @@ def project_chains_from_start(work, model, inverse_h2, iteration):
                 before,
                 link,
                 row(work, j),
-                inverse_mass[i],
-                inverse_mass[j],
+                inverse_mass_of(masses, i),
+                inverse_mass_of(masses, j),
                 rest[entry],
                 _stiffened(compliance, entry, inverse_h2, iteration),
             )
             before = link
-        _back_substitute(work, particles, inverse_mass, first, last, POSITION)
+        _back_substitute(work, masses, particles, first, last, POSITION)
 
 
 @kernel
-def project_chain_velocities(work, model):
+def project_chain_velocities(work, masses, chains):
     """Remove the velocity along rigid links (the second half of RATTLE)."""
-    offsets, particles = model.chain_offsets, model.chain_particles
-    inverse_mass, compliance = model.inverse_mass, model.link_compliance
+    offsets, particles = chains.offsets, chains.particles
+    compliance = chains.compliance
     zero_row = row(work, work.shape[0] - 1)
     free = work.dtype.type(_FREE)
     zero = work.dtype.type(0)
@@ -101,12 +102,12 @@ def project_chain_velocities(work, model):
                 before,
                 link,
                 row(work, j),
-                inverse_mass[i],
-                inverse_mass[j],
+                inverse_mass_of(masses, i),
+                inverse_mass_of(masses, j),
                 zero if compliance[entry] == zero else free,
             )
             before = link
-        _back_substitute(work, particles, inverse_mass, first, last, VELOCITY)
+        _back_substitute(work, masses, particles, first, last, VELOCITY)
 
 
 @kernel
@@ -122,7 +123,7 @@ def _stiffened(compliance, entry, inverse_h2, iteration):
 @kernel
 def _eliminate_current(before, a, b, mass_a, mass_b, rest, alpha):
     """Eliminate the link before this one; the direction is the current one."""
-    real = type(mass_a)
+    real = type(a[0])
     one, zero = real(1), real(0)
     floor = real(_PIVOT_FLOOR)
     for lane in range(LANES):
@@ -138,9 +139,10 @@ def _eliminate_current(before, a, b, mass_a, mass_b, rest, alpha):
             delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             cosine += delta * inverse * before[DIRECTION + k * LANES + lane]
             a[DIRECTION + k * LANES + lane] = delta * inverse
-        coupling = -mass_a * cosine
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        coupling = -w_a * cosine
         factor = coupling * before[PIVOT + lane]
-        diagonal = mass_a + mass_b + alpha
+        diagonal = w_a + w_b + alpha
         pivot = max(diagonal - factor * coupling, floor * diagonal)
         a[COUPLING + lane] = coupling
         a[PIVOT + lane] = one / pivot if pivot > zero else zero
@@ -156,7 +158,7 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
     turned so far within the substep that the start direction does not lead back to its length, its
     current direction and C = |x_a - x_b| - rest are taken.
     """
-    real = type(mass_a)
+    real = type(a[0])
     one, zero, half = real(1), real(0), real(0.5)
     floor = real(_PIVOT_FLOOR)
     inverse = one / rest
@@ -185,9 +187,10 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
             upper += link_before * before[SCALE + lane] * direction
             a[DIRECTION + k * LANES + lane] = direction
         a[SCALE + lane] = scale
-        diagonal = (mass_a + mass_b) * own + alpha
-        factor = -mass_a * lower * before[PIVOT + lane]
-        coupling = -mass_a * upper
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        diagonal = (w_a + w_b) * own + alpha
+        factor = -w_a * lower * before[PIVOT + lane]
+        coupling = -w_a * upper
         pivot = max(diagonal - factor * coupling, floor * diagonal)
         error = (length - rest) if turned else half * (square * inverse - rest)
         a[COUPLING + lane] = coupling
@@ -198,7 +201,7 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
 @kernel
 def _eliminate_velocity(before, a, b, mass_a, mass_b, alpha):
     """Eliminate the link before this one; the unknowns are impulses along the links."""
-    real = type(mass_a)
+    real = type(a[0])
     one, zero = real(1), real(0)
     floor = real(_PIVOT_FLOOR)
     for lane in range(LANES):
@@ -214,9 +217,10 @@ def _eliminate_velocity(before, a, b, mass_a, mass_b, alpha):
             delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             cosine += delta * inverse * before[DIRECTION + k * LANES + lane]
             a[DIRECTION + k * LANES + lane] = delta * inverse
-        coupling = -mass_a * cosine
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        coupling = -w_a * cosine
         factor = coupling * before[PIVOT + lane]
-        diagonal = mass_a + mass_b + alpha
+        diagonal = w_a + w_b + alpha
         pivot = max(diagonal - factor * coupling, floor * diagonal)
         a[COUPLING + lane] = coupling
         a[PIVOT + lane] = one / pivot if pivot > zero else zero
@@ -224,13 +228,20 @@ def _eliminate_velocity(before, a, b, mass_a, mass_b, alpha):
 
 
 @kernel
-def _back_substitute(work, particles, inverse_mass, first, last, quantity):
+def _back_substitute(work, masses, particles, first, last, quantity):
     """Find the multipliers from the last link to the first and move the particles by them."""
     after = row(work, work.shape[0] - 1)
     for entry in range(last - 1, first - 1, -1):
         i, j = particles[entry], particles[entry + 1]
         link = row(work, i)
-        _apply(link, row(work, j), after, inverse_mass[i], inverse_mass[j], quantity)
+        _apply(
+            link,
+            row(work, j),
+            after,
+            inverse_mass_of(masses, i),
+            inverse_mass_of(masses, j),
+            quantity,
+        )
         after = link
 
 
@@ -242,38 +253,43 @@ def _apply(a, b, after, mass_a, mass_b, quantity):
         a[MULTIPLIER + lane] = step
         for k in range(DIM):
             move = step * a[DIRECTION + k * LANES + lane]
-            a[quantity + k * LANES + lane] -= mass_a * move
-            b[quantity + k * LANES + lane] += mass_b * move
+            a[quantity + k * LANES + lane] -= in_lane(mass_a, a, lane) * move
+            b[quantity + k * LANES + lane] += in_lane(mass_b, b, lane) * move
 
 
 @kernel
-def limit_strains(work, model):
+def limit_strains(work, masses, chains):
     """Shorten links that are stretched beyond their limit, one after another.
 
     Threads that cross are solved in turn, so the last ones leave an error in the others; where a
     cloth is pulled taut between its pins it would take many turns to vanish.
     """
-    offsets, particles = model.chain_offsets, model.chain_particles
-    inverse_mass, greatest = model.inverse_mass, model.link_greatest_length
-    chains = offsets.shape[0] - 1
-    for turn in range(2 * chains):
+    offsets, particles = chains.offsets, chains.particles
+    greatest = chains.greatest
+    count = offsets.shape[0] - 1
+    for turn in range(2 * count):
         # there and back, so that no thread is always the last
-        chain = turn if turn < chains else 2 * chains - 1 - turn
+        chain = turn if turn < count else 2 * count - 1 - turn
         for entry in range(offsets[chain], offsets[chain + 1] - 1):
             if greatest[entry] < np.inf:
                 i, j = particles[entry], particles[entry + 1]
                 _shorten(
-                    row(work, i), row(work, j), inverse_mass[i], inverse_mass[j], greatest[entry]
+                    row(work, i),
+                    row(work, j),
+                    inverse_mass_of(masses, i),
+                    inverse_mass_of(masses, j),
+                    greatest[entry],
                 )
 
 
 @kernel
 def _shorten(a, b, mass_a, mass_b, greatest):
-    real = type(mass_a)
+    real = type(a[0])
     one, zero = real(1), real(0)
-    total = mass_a + mass_b
-    share = one / total if total > zero else zero
     for lane in range(LANES):
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        total = w_a + w_b
+        share = one / total if total > zero else zero
         square = zero
         for k in range(DIM):
             delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
@@ -282,5 +298,5 @@ def _shorten(a, b, mass_a, mass_b, greatest):
         scale = share * (one - greatest / length) if length > greatest else zero
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
-            a[POSITION + k * LANES + lane] -= mass_a * move
-            b[POSITION + k * LANES + lane] += mass_b * move
+            a[POSITION + k * LANES + lane] -= w_a * move
+            b[POSITION + k * LANES + lane] += w_b * move

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..compiling import kernel, row
 from .layout import DIM, LANES, POSITION, START, VELOCITY
+from .masses import in_lane, inverse_mass_of
 
 # Particles built closer to each other than this many collision distances are neighbours in the
 # body: its own constraints hold them apart.
@@ -21,14 +22,16 @@ _PRESSURE = 2.0
 
 
 @kernel
-def find_pairs(work, model, pairs, counts, dt):
+def find_pairs(work, masses, collision, found, dt):
     """List, for every lane, the pairs that can come into contact within the control step.
 
-    pairs: (LANES, capacity, 2); counts: (LANES,). What exceeds the capacity is left out (the
-    capacity is several times what a crumpled cloth needs).
+    found: pairs (LANES, capacity, 2) and their number (LANES,). What exceeds the capacity is left
+    out (the capacity is several times what a crumpled cloth needs).
     """
-    particles, rest = model.collision_particles, model.positions
-    distance = model.collision_distance[0]
+    if collision is None:
+        return
+    pairs, counts = found
+    particles, rest, distance = collision.particles, masses.positions, collision.distance
     apart = distance * work.dtype.type(_NEIGHBOURHOOD)
     for lane in range(LANES):
         counts[lane] = 0
@@ -99,24 +102,28 @@ def _square_distance(a, b, quantity, lane, zero):
 
 
 @kernel
-def collide_with_self(work, model, pairs, counts, h, gravity):
+def collide_with_self(work, masses, collision, found, h, gravity):
     """Push the listed pairs apart to the collision distance, with friction between them.
 
     A pair that began the substep closer than that is let apart at `_PARTING_SPEED` only (Macklin et
     al. 2019, eq. 10): pushed out at once, it would fly apart at depth/h, and folds that lie through
     each other would never come to rest.
     """
+    if collision is None:
+        return
+    pairs, counts = found
     zero = work.dtype.type(0)
-    inverse_mass = model.inverse_mass
-    distance = model.collision_distance[0]
+    distance = collision.distance
     parting = work.dtype.type(_PARTING_SPEED) * h
-    held = model.contact[2] * work.dtype.type(_PRESSURE) * gravity * h * h
+    held = collision.friction * work.dtype.type(_PRESSURE) * gravity * h * h
     for lane in range(LANES):
         for index in range(counts[lane]):
             i, j = pairs[lane, index, 0], pairs[lane, index, 1]
             a, b = row(work, i), row(work, j)
             square = _square_distance(a, b, POSITION, lane, zero)
-            total = inverse_mass[i] + inverse_mass[j]
+            w_a = in_lane(inverse_mass_of(masses, i), a, lane)
+            w_b = in_lane(inverse_mass_of(masses, j), b, lane)
+            total = w_a + w_b
             if zero < square < distance * distance and total > zero:
                 length = np.sqrt(square)
                 before = np.sqrt(_square_distance(a, b, START, lane, zero))
@@ -124,9 +131,9 @@ def collide_with_self(work, model, pairs, counts, h, gravity):
                 push = depth / (length * total)
                 for k in range(DIM):
                     move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
-                    a[POSITION + k * LANES + lane] += inverse_mass[i] * move
-                    b[POSITION + k * LANES + lane] -= inverse_mass[j] * move
-                _rub(a, b, lane, inverse_mass[i], inverse_mass[j], held)
+                    a[POSITION + k * LANES + lane] += w_a * move
+                    b[POSITION + k * LANES + lane] -= w_b * move
+                _rub(a, b, lane, w_a, w_b, held)
 
 
 @kernel

@@ -7,10 +7,10 @@ from .layout import DIM, LANES, POSITION, START, VELOCITY
 
 
 @kernel
-def collide_with_walls(work, model):
+def collide_with_walls(work, masses, room):
     """Put every free particle back into the room, with friction."""
-    inverse_mass, lower_wall, upper_wall = model.inverse_mass, model.lower, model.upper
-    radius, friction = model.contact[0], model.contact[2]
+    inverse_mass, lower_wall, upper_wall = masses.inverse_mass, room.lower, room.upper
+    radius, friction = room.radius, room.friction
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
             at = row(work, particle)
@@ -21,14 +21,14 @@ def collide_with_walls(work, model):
 
 
 @kernel
-def read_velocities(work, model, inverse_h, rest_speed):
+def read_velocities(work, masses, room, inverse_h, rest_speed):
     """Read the velocities off the positions, v = (x - x_start)/h; at a wall, with restitution.
 
     rest_speed [m/s]: slower impacts do not bounce, else gravity alone would make resting particles
     hop.
     """
-    inverse_mass, lower_wall, upper_wall = model.inverse_mass, model.lower, model.upper
-    radius, restitution = model.contact[0], model.contact[1]
+    inverse_mass, lower_wall, upper_wall = masses.inverse_mass, room.lower, room.upper
+    radius, restitution = room.radius, room.restitution
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
             at = row(work, particle)

@@ -17,4 +17,5 @@ COUPLING = 4 * DIM * LANES  # off-diagonal entry that couples the link to the on
 PIVOT = COUPLING + LANES  # reciprocal pivot of the elimination
 MULTIPLIER = PIVOT + LANES  # right-hand side, then the link's multiplier
 SCALE = MULTIPLIER + LANES  # 1/length that turns the link into its gradient
-WIDTH = SCALE + LANES
+MASS = SCALE + LANES  # inverse mass, where it differs from lane to lane
+WIDTH = MASS + LANES

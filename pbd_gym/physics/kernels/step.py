@@ -21,7 +21,7 @@ __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
 
 @kernel
-def advance(x, v, targets, tiles, work, collision, second_order, model, timing, substeps):
+def advance(x, v, targets, tiles, work, found, model, timing, substeps):
     """Advance the worlds of tiles[0] <= tile < tiles[1] by one control step, in place.
 
     Args:
@@ -30,26 +30,26 @@ def advance(x, v, targets, tiles, work, collision, second_order, model, timing, 
         targets: Where the pins are at the end of the step, (W, P, DIM) [m].
         tiles: First and last + 1 tile of LANES worlds.
         work: Scratch (N + 1, WIDTH); the last row is zero.
-        collision: Scratch of self-collision (candidate pairs, their counts), or None.
-            What is
-            None is known when compiling: the code behind it is not compiled at all.
-        second_order: True for RATTLE, None for PBD.
-        model: The Parameters.
-        timing: dt of the control step [s], h of a substep [s], 1/h, 1/h^2, exp(-damping h), and the
-            speed below which impacts do not bounce [m/s], size of gravity [m/s2].
+        found: Scratch of self-collision (candidate pairs, their numbers), or None.
+        model: The Parameters. A table that is None is known when compiling: each function that
+            serves it returns at once, and nothing behind that is compiled.
+        timing: The Timing.
         substeps: Number of substeps.
     """
+    masses = model.particles
     for tile in range(tiles[0], tiles[1]):
         _load(x, v, tile, work)
-        _aim_pins(x, targets, tile, work, model, timing)
-        if collision is not None:
-            find_pairs(work, model, collision[0], collision[1], timing[0])
+        _aim_pins(x, targets, tile, work, masses.pins, timing)
+        find_pairs(work, masses, model.self_collision, found, timing.dt)
         for substep in range(substeps):
             remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
-            _predict(work, model, timing, second_order)
-            _move_pins(x, targets, tile, work, model, remaining)
-            _project(work, model, collision, timing, second_order)
-            _finish(work, model, timing, second_order)
+            _predict(work, masses, timing, model.second_order)
+            _move_pins(x, targets, tile, work, masses.pins, remaining)
+            _project(work, model, found, timing, model.second_order)
+            collide_with_walls(work, masses, model.room)
+            limit_strains(work, masses, model.chains)
+            read_velocities(work, masses, model.room, timing.inverse_h, timing.rest_speed)
+            _finish(work, model, timing, model.second_order)
         _store(x, v, tile, work)
 
 
@@ -81,22 +81,20 @@ def _store(x, v, tile, work):
 
 
 @kernel
-def _aim_pins(x, targets, tile, work, model, timing):
+def _aim_pins(x, targets, tile, work, pins, timing):
     """Give the pins the velocity that brings them to their targets within the control step."""
-    pins = model.pins
     for index in range(pins.shape[0]):
         pin = pins[index]
         for lane in range(LANES):
             world = _world(tile, lane, x.shape[0])
             for k in range(DIM):
                 move = targets[world, index, k] - x[world, pin, k]
-                work[pin, VELOCITY + k * LANES + lane] = move / timing[0]
+                work[pin, VELOCITY + k * LANES + lane] = move / timing.dt
 
 
 @kernel
-def _move_pins(x, targets, tile, work, model, remaining):
+def _move_pins(x, targets, tile, work, pins, remaining):
     """Interpolate the pins linearly: a jump would bring in energy that grows with substeps^2."""
-    pins = model.pins
     for index in range(pins.shape[0]):
         pin = pins[index]
         for lane in range(LANES):
@@ -108,11 +106,11 @@ def _move_pins(x, targets, tile, work, model, remaining):
 
 
 @kernel
-def _predict(work, model, timing, second_order):
+def _predict(work, masses, timing, second_order):
     """Steps 1-3 of the seed: damp, add the acceleration, move. Second order kicks by half here."""
     half = work.dtype.type(0.5)
-    h, decay = timing[1], timing[4]
-    inverse_mass, gravity = model.inverse_mass, model.gravity
+    h, decay = timing.h, timing.decay
+    inverse_mass, gravity = masses.inverse_mass, masses.gravity
     for particle in range(inverse_mass.shape[0]):
         at = row(work, particle)
         free = inverse_mass[particle] > 0
@@ -129,36 +127,35 @@ def _predict(work, model, timing, second_order):
 
 
 @kernel
-def _project(work, model, collision, timing, second_order):
+def _project(work, model, found, timing, second_order):
     """Step 4: satisfy the constraints. Soft ones first, chains after them, contacts last."""
+    masses, inverse_h2 = model.particles, timing.inverse_h2
     for iteration in range(model.iterations):
         if iteration == 0:
-            project_bends(work, model, timing[3])
-            if collision is not None:
-                collide_with_self(work, model, collision[0], collision[1], timing[1], timing[6])
+            project_bends(work, masses, model.bends, inverse_h2)
+            collide_with_self(work, masses, model.self_collision, found, timing.h, timing.gravity)
         if second_order is not None:
-            project_distances_from_start(work, model, timing[3], iteration)
-            project_chains_from_start(work, model, timing[3], iteration)
+            project_distances_from_start(work, masses, model.distances, inverse_h2, iteration)
+            project_chains_from_start(work, masses, model.chains, inverse_h2, iteration)
         else:
-            project_distances(work, model, timing[3], iteration)
-            project_chains(work, model, timing[3], iteration)
+            project_distances(work, masses, model.distances, inverse_h2, iteration)
+            project_chains(work, masses, model.chains, inverse_h2, iteration)
 
 
 @kernel
 def _finish(work, model, timing, second_order):
-    """Step 5: walls, then velocities from positions; second order adds its other half kick."""
-    collide_with_walls(work, model)
-    limit_strains(work, model)
-    read_velocities(work, model, timing[2], timing[5])
-    if second_order is not None:
-        half = work.dtype.type(0.5)
-        inverse_mass, gravity = model.inverse_mass, model.gravity
-        for particle in range(inverse_mass.shape[0]):
-            if inverse_mass[particle] > 0:
-                at = row(work, particle)
-                for k in range(DIM):
-                    kick = gravity[k] * timing[1] * half
-                    for lane in range(k * LANES, (k + 1) * LANES):
-                        at[VELOCITY + lane] += kick
-        project_distance_velocities(work, model)
-        project_chain_velocities(work, model)
+    """Second order: the other half kick, and no velocity along what is rigid."""
+    if second_order is None:
+        return
+    masses = model.particles
+    half = work.dtype.type(0.5)
+    inverse_mass, gravity = masses.inverse_mass, masses.gravity
+    for particle in range(inverse_mass.shape[0]):
+        if inverse_mass[particle] > 0:
+            at = row(work, particle)
+            for k in range(DIM):
+                kick = gravity[k] * timing.h * half
+                for lane in range(k * LANES, (k + 1) * LANES):
+                    at[VELOCITY + lane] += kick
+    project_distance_velocities(work, masses, model.distances)
+    project_chain_velocities(work, masses, model.chains)

@@ -4,16 +4,17 @@ import numpy as np
 
 from ..compiling import kernel, row
 from .layout import DIM, LANES, POSITION, START, VELOCITY
+from .masses import in_lane, inverse_mass_of
 
 
 @kernel
-def project_distances(work, model, inverse_h2, iteration):
+def project_distances(work, masses, distances, inverse_h2, iteration):
     """Project every distance along its current direction (Mueller et al. 2007, eq. 10-11).
 
     A compliant one is projected in the first iteration only: a second would make it stiffer.
     """
-    inverse_mass, pairs, rest = model.inverse_mass, model.distance_pairs, model.distance_rest
-    compliance, stiffness = model.distance_compliance, model.distance_stiffness
+    pairs, rest = distances.pairs, distances.rest
+    compliance, stiffness = distances.compliance, distances.stiffness
     for index in range(rest.shape[0]):
         i, j = pairs[index, 0], pairs[index, 1]
         alpha = compliance[index]
@@ -21,8 +22,8 @@ def project_distances(work, model, inverse_h2, iteration):
             _distance(
                 row(work, i),
                 row(work, j),
-                inverse_mass[i],
-                inverse_mass[j],
+                inverse_mass_of(masses, i),
+                inverse_mass_of(masses, j),
                 rest[index],
                 alpha * inverse_h2,
                 stiffness[index],
@@ -31,11 +32,12 @@ def project_distances(work, model, inverse_h2, iteration):
 
 @kernel
 def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness):
-    real = type(mass_a)
+    real = type(a[0])
     one, zero = real(1), real(0)
-    total = mass_a + mass_b + alpha
-    share = stiffness / total if total > zero else zero
     for lane in range(LANES):
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        total = w_a + w_b + alpha
+        share = stiffness / total if total > zero else zero
         square = zero
         for k in range(DIM):
             delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
@@ -45,15 +47,15 @@ def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness):
         scale = share * (one - rest / length) if length > zero else zero
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
-            a[POSITION + k * LANES + lane] -= mass_a * move
-            b[POSITION + k * LANES + lane] += mass_b * move
+            a[POSITION + k * LANES + lane] -= w_a * move
+            b[POSITION + k * LANES + lane] += w_b * move
 
 
 @kernel
-def project_distances_from_start(work, model, inverse_h2, iteration):
+def project_distances_from_start(work, masses, distances, inverse_h2, iteration):
     """Project every distance along its direction at the start of the substep (SHAKE)."""
-    inverse_mass, pairs, rest = model.inverse_mass, model.distance_pairs, model.distance_rest
-    compliance, stiffness = model.distance_compliance, model.distance_stiffness
+    pairs, rest = distances.pairs, distances.rest
+    compliance, stiffness = distances.compliance, distances.stiffness
     for index in range(rest.shape[0]):
         i, j = pairs[index, 0], pairs[index, 1]
         alpha = compliance[index]
@@ -61,8 +63,8 @@ def project_distances_from_start(work, model, inverse_h2, iteration):
             _distance_from_start(
                 row(work, i),
                 row(work, j),
-                inverse_mass[i],
-                inverse_mass[j],
+                inverse_mass_of(masses, i),
+                inverse_mass_of(masses, j),
                 rest[index],
                 alpha * inverse_h2,
                 stiffness[index],
@@ -72,7 +74,7 @@ def project_distances_from_start(work, model, inverse_h2, iteration):
 @kernel
 def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
     """One Newton step of (|x_a - x_b|^2 - rest^2) / (2 rest) = 0 along the start direction."""
-    real = type(mass_a)
+    real = type(a[0])
     one, zero, half = real(1), real(0), real(0.5)
     inverse = one / rest
     for lane in range(LANES):
@@ -84,7 +86,8 @@ def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
             aligned += now * start
         turned = aligned < half * rest * rest
         slope = (square if turned else aligned) * inverse * inverse
-        total = (mass_a + mass_b) * slope + alpha
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        total = (w_a + w_b) * slope + alpha
         scale = (
             stiffness * half * (square * inverse - rest) * inverse / total if total > zero else zero
         )
@@ -92,28 +95,30 @@ def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
             now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
             move = scale * (now if turned else start)
-            a[POSITION + k * LANES + lane] -= mass_a * move
-            b[POSITION + k * LANES + lane] += mass_b * move
+            a[POSITION + k * LANES + lane] -= w_a * move
+            b[POSITION + k * LANES + lane] += w_b * move
 
 
 @kernel
-def project_distance_velocities(work, model):
+def project_distance_velocities(work, masses, distances):
     """Remove the velocity along rigid distances (the second half of RATTLE)."""
-    inverse_mass, pairs = model.inverse_mass, model.distance_pairs
-    compliance = model.distance_compliance
+    pairs, compliance = distances.pairs, distances.compliance
     for index in range(pairs.shape[0]):
         i, j = pairs[index, 0], pairs[index, 1]
         if compliance[index] == 0:
-            _distance_velocity(row(work, i), row(work, j), inverse_mass[i], inverse_mass[j])
+            _distance_velocity(
+                row(work, i), row(work, j), inverse_mass_of(masses, i), inverse_mass_of(masses, j)
+            )
 
 
 @kernel
 def _distance_velocity(a, b, mass_a, mass_b):
-    real = type(mass_a)
+    real = type(a[0])
     one, zero = real(1), real(0)
-    total = mass_a + mass_b
-    share = one / total if total > zero else zero
     for lane in range(LANES):
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        total = w_a + w_b
+        share = one / total if total > zero else zero
         square, rate = zero, zero
         for k in range(DIM):
             delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
@@ -122,29 +127,28 @@ def _distance_velocity(a, b, mass_a, mass_b):
         scale = share * rate / square if square > zero else zero
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
-            a[VELOCITY + k * LANES + lane] -= mass_a * move
-            b[VELOCITY + k * LANES + lane] += mass_b * move
+            a[VELOCITY + k * LANES + lane] -= w_a * move
+            b[VELOCITY + k * LANES + lane] += w_b * move
 
 
 @kernel
-def project_bends(work, model, inverse_h2):
+def project_bends(work, masses, bends, inverse_h2):
     """Draw C = x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta.
 
     Dry friction holds C where it is, with a force of its own limit. It is what real cloth shows
     when bent back and forth, and what lets a crumpled one come to rest: it stops slow creeping
     entirely, as a dashpot cannot, and hardly brakes quick motion.
     """
-    inverse_mass, triples = model.inverse_mass, model.bend_triples
-    compliance, friction = model.bend_compliance, model.bend_friction
+    triples, compliance, friction = bends.triples, bends.compliance, bends.friction
     for index in range(triples.shape[0]):
         i, j, k = triples[index, 0], triples[index, 1], triples[index, 2]
         _bend(
             row(work, i),
             row(work, j),
             row(work, k),
-            inverse_mass[i],
-            inverse_mass[j],
-            inverse_mass[k],
+            inverse_mass_of(masses, i),
+            inverse_mass_of(masses, j),
+            inverse_mass_of(masses, k),
             compliance[index] * inverse_h2,
             friction[index] / inverse_h2,
         )
@@ -152,12 +156,14 @@ def project_bends(work, model, inverse_h2):
 
 @kernel
 def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held):
-    real = type(mass_a)
+    real = type(a[0])
     one, two, four, zero = real(1), real(2), real(4), real(0)
-    total = mass_a + four * mass_b + mass_c
-    elastic = one / (total + alpha) if total > zero else zero
-    static = one / total if total > zero else zero
     for lane in range(LANES):
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        w_c = in_lane(mass_c, c, lane)
+        total = w_a + four * w_b + w_c
+        elastic = one / (total + alpha) if total > zero else zero
+        static = one / total if total > zero else zero
         square = zero
         for k in range(DIM):
             at, start = POSITION + k * LANES + lane, START + k * LANES + lane
@@ -169,6 +175,6 @@ def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held):
             at, start = POSITION + k * LANES + lane, START + k * LANES + lane
             change = a[at] - a[start] - two * (b[at] - b[start]) + c[at] - c[start]
             move = elastic * (a[at] - two * b[at] + c[at]) + rub * change
-            a[at] -= mass_a * move
-            b[at] += two * mass_b * move
-            c[at] -= mass_c * move
+            a[at] -= w_a * move
+            b[at] += two * w_b * move
+            c[at] -= w_c * move

@@ -1,0 +1,74 @@
+"""The ModelBuilder: collects what a world is made of, checks it all, returns a Model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pbd_gym.physics.building.contacts import ContactBuilder
+from pbd_gym.physics.building.links import LinkBuilder
+from pbd_gym.physics.model import Model
+
+INTEGRATORS = ("pbd", "rattle")
+
+
+class ModelBuilder(LinkBuilder, ContactBuilder):
+    """Collects particles and what holds between them; `build` checks it all and returns a Model.
+
+    Args:
+        dim: Number of space axes, 2 or 3. The last axis points up.
+    """
+
+    def build(
+        self,
+        *,
+        gravity: Any = None,
+        damping: float = 0.0,
+        integrator: str = "pbd",
+        iterations: int = 1,
+    ) -> Model:
+        """Check everything that was added and return the Model.
+
+        Args:
+            gravity: (dim,) [m/s2]; 9.81 downwards where None.
+            damping: Rate at which free velocities decay [1/s].
+            integrator: "pbd": positions are projected along the current constraint direction and
+                velocities read off (first order, dissipates like backward Euler). "rattle": chains
+                and distances are projected along the direction at the start of the substep, then
+                velocities too (second order, keeps energy); for pendulums and short chains.
+            iterations: Projections of rigid constraints in a substep. A compliant constraint
+                receives its force in the first and keeps it.
+
+        Raises:
+            ValueError: Naming the index and the value of what cannot be.
+        """
+        if gravity is None:
+            gravity = np.zeros(self.dim)
+            gravity[-1] = -9.81
+        particles = self._particle_table(np.array(gravity, dtype=np.float64))
+        _check_settings(damping, integrator, iterations)
+        chains = self._chain_table()
+        return Model(
+            dim=self.dim,
+            damping=float(damping),
+            integrator=integrator,
+            iterations=int(iterations),
+            particles=particles,
+            chains=chains,
+            distances=self._distance_table(chains),
+            bends=self._bend_table(),
+            room=self._room_table(),
+            self_collision=self._self_collision_table(),
+            bodies=tuple(self._bodies),
+        )
+
+
+def _check_settings(damping: float, integrator: str, iterations: int) -> None:
+    if not (np.isfinite(damping) and damping >= 0.0):
+        raise ValueError(f"damping is {damping}; a rate must be finite and at least 0 [1/s]")
+    if integrator not in INTEGRATORS:
+        raise ValueError(f"integrator is {integrator!r}; allowed: {', '.join(INTEGRATORS)}")
+    whole = isinstance(iterations, int | np.integer) and not isinstance(iterations, bool)
+    if not whole or iterations < 1:
+        raise ValueError(f"iterations is {iterations!r}; expected a whole number from 1 up")

@@ -1,0 +1,1 @@
+"""The parts of a ModelBuilder, one per kind of thing that is added."""

@@ -1,0 +1,172 @@
+"""What a Model is made of: one table per kind of constraint or contact.
+
+A Model holds them as checked by `ModelBuilder.build`: float64 and int64, read-only. The kernels
+read the same tables in the state's dtype. A kind that a model does not have is None, which is known
+when the kernels are compiled: what would serve it is not compiled at all.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Particles(NamedTuple):
+    """Point masses, and what acts on all of them.
+
+    Attributes:
+        positions: As built, (N, dim) [m].
+        inverse_mass: (N,) [1/kg]; 0 is a pinned particle, moved only by its target.
+        pins: (P,) particles of inverse mass 0.
+        grabbable: (G,) particles that can be pins in some worlds and free in others, or None.
+        gravity: (dim,) [m/s2].
+    """
+
+    positions: Any
+    inverse_mass: Any
+    pins: Any
+    grabbable: Any
+    gravity: Any
+
+
+class Chains(NamedTuple):
+    """Links in a row, solved directly; C chains with L entries, chain after chain.
+
+    Attributes:
+        offsets: (C + 1,) first entry of each chain.
+        particles: (L,) particle of each entry.
+        rest: (L,) rest length of the link that starts at an entry [m]; a chain's last is unused.
+        compliance: (L,) of a stretched link [m/N].
+        greatest: (L,) length beyond which a link is cut short after all else [m].
+    """
+
+    offsets: Any
+    particles: Any
+    rest: Any
+    compliance: Any
+    greatest: Any
+
+    def links(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the links: their particles (links, 2) and rest lengths [m]."""
+        last = np.zeros(len(self.particles), dtype=bool)
+        last[self.offsets[1:] - 1] = True
+        entries = np.flatnonzero(~last)
+        pairs = np.stack([self.particles[entries], self.particles[entries + 1]], axis=1)
+        return pairs, self.rest[entries]
+
+
+class Distances(NamedTuple):
+    """Distances kept by sweeps.
+
+    Attributes:
+        pairs: (E, 2) particles.
+        rest: (E,) [m].
+        compliance: (E,) [m/N].
+        stiffness: (E,) the seed's k in (0, 1].
+    """
+
+    pairs: Any
+    rest: Any
+    compliance: Any
+    stiffness: Any
+
+
+class Bends(NamedTuple):
+    """Straight rest of three particles in a row.
+
+    Attributes:
+        triples: (B, 3) particles a, b, c with b between the others.
+        compliance: (B,) l^3/EI [m/N].
+        friction: (B,) limit of the dry friction of bending [N].
+    """
+
+    triples: Any
+    compliance: Any
+    friction: Any
+
+
+class Room(NamedTuple):
+    """Axis-aligned walls (the seed's window).
+
+    Attributes:
+        lower: (dim,) [m], -inf where there is no wall.
+        upper: (dim,) [m], +inf where there is no wall.
+        radius: Distance that particles keep from a wall [m].
+        restitution: In [0, 1].
+        friction: Coulomb coefficient.
+    """
+
+    lower: Any
+    upper: Any
+    radius: Any
+    restitution: Any
+    friction: Any
+
+
+class SelfCollision(NamedTuple):
+    """Particles that keep their distance from each other.
+
+    Attributes:
+        particles: (S,) particles.
+        distance: That they keep [m].
+        friction: Coulomb coefficient between them.
+    """
+
+    particles: Any
+    distance: Any
+    friction: Any
+
+
+class Parameters(NamedTuple):
+    """A model as the kernels read it.
+
+    Attributes:
+        second_order: True for RATTLE, None for PBD.
+        iterations: Projections of the rigid constraints in a substep.
+    """
+
+    particles: Particles
+    chains: Chains
+    distances: Distances
+    bends: Bends
+    room: Room
+    self_collision: SelfCollision | None
+    second_order: bool | None
+    iterations: int
+
+
+class Timing(NamedTuple):
+    """What the kernels derive from the time step, in the state's dtype.
+
+    Attributes:
+        dt: Control step [s].
+        h: Substep [s].
+        inverse_h: 1/h [1/s].
+        inverse_h2: 1/h^2 [1/s2].
+        decay: exp(-damping h).
+        rest_speed: Speed below which impacts do not bounce [m/s].
+        gravity: Size of gravity [m/s2].
+    """
+
+    dt: Any
+    h: Any
+    inverse_h: Any
+    inverse_h2: Any
+    decay: Any
+    rest_speed: Any
+    gravity: Any
+
+
+def as_read(table: Any, dtype: np.dtype) -> Any:
+    """Return a table as the kernels read it: its numbers in a dtype, its arrays writable copies.
+
+    A read-only array would be another type to compile for.
+    """
+    if table is None or isinstance(table, bool | int):
+        return table
+    if isinstance(table, float):
+        return dtype.type(table)
+    if isinstance(table, np.ndarray):
+        return table.astype(dtype if table.dtype.kind == "f" else np.int64)
+    return type(table)(*(as_read(value, dtype) for value in table))
