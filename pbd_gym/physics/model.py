@@ -61,8 +61,8 @@ class Model:
             if not spec.init or spec.name == "bodies":
                 continue
             value = getattr(self, spec.name)
-            if isinstance(value, tuple):
-                for name, part in zip(type(value)._fields, value, strict=True):
+            if hasattr(value, "_asdict"):
+                for name, part in value._asdict().items():
                     yield f"{spec.name}.{name}", part
             else:
                 yield spec.name, value
