@@ -8,7 +8,7 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench clean
+.PHONY: help train test lint bench accuracy clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -31,6 +31,9 @@ lint: .venv/.installed-all ## check style, formatting, types, imports and spelli
 bench: .venv/.installed-core ## measure control steps per second
 	$(BIN)/python benchmarks/throughput.py $(ARGS)
 
+accuracy: .venv/.installed-peers ## compare error and cost with other engines
+	$(BIN)/python benchmarks/accuracy.py $(ARGS)
+
 clean: ## remove .venv, caches and build files; results of training stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -39,6 +42,7 @@ clean: ## remove .venv, caches and build files; results of training stay
 .venv/.installed-train: EXTRAS := [train,video]
 .venv/.installed-test: EXTRAS := [train,video,test]
 .venv/.installed-all: EXTRAS := [all]
+.venv/.installed-peers: EXTRAS := [peers]
 
 .venv/.installed-%: pyproject.toml constraints.txt | $(BIN)/pip
 	$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt -e ".$(EXTRAS)"
