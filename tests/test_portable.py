@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from pbd_gym.physics.portable import cos_sin, exp
+from pbd_gym.physics.portable import cos_sin, exp, exp_scalar
 
 
 def test_exp_is_right_to_13_digits_down_to_minus_64():
@@ -70,5 +70,6 @@ def test_the_argument_is_left_alone_whatever_its_layout():
 def test_each_number_gives_the_same_bits_alone_and_among_many():
     values = -np.random.default_rng(0).uniform(0.0, 3.0, 101)
     np.testing.assert_array_equal(exp(values), [exp(value) for value in values])
+    np.testing.assert_array_equal(exp(values), [exp_scalar(value) for value in values])
     for many, alone in zip(cos_sin(values), zip(*map(cos_sin, values), strict=True), strict=True):
         np.testing.assert_array_equal(many, alone)

@@ -3,7 +3,8 @@
 The kernels package is loaded under one name per pair of compile-time constants, as a C++ template
 is instantiated: `kernels` with DIM = 2 and LANES = 1 is the module `kernels_2d_1`. numba would not
 notice that a called function in another file changed, so the cache folder is named by a hash of
-all kernel sources, of numba's version and of the processor compiled for.
+all kernel sources, of numba's version and of the processor compiled for; within it, the folder of
+each package by a hash of its files.
 """
 
 from __future__ import annotations
@@ -45,12 +46,22 @@ def kernel(function: Callable[..., Any]) -> Any:
         return numba.njit(**options)(function)
     # numba names its files after the source file alone: each loaded package needs a folder of its
     # own
-    folder /= function.__module__.split(".")[-2]
+    package = function.__module__.split(".")[-2]
+    folder /= f"{package}-{_digest_of(Path(function.__code__.co_filename).parent)}"
     before, _SETTINGS.CACHE_DIR = _SETTINGS.CACHE_DIR, str(folder)
     try:
         return numba.njit(cache=True, **options)(function)
     finally:
         _SETTINGS.CACHE_DIR = before
+
+
+@functools.cache
+def _digest_of(package: Path) -> str:
+    """Return a hash of the source files of a package: its functions may call each other."""
+    digest = hashlib.sha256()
+    for source in sorted(package.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def _row(typing_context: Any, array: Any, index: Any) -> Any:
@@ -109,7 +120,9 @@ def cache_folder() -> Path | None:
     NUMBA_CACHE_DIR is taken before the user's cache folder, then the system's temporary folder.
     """
     digest = hashlib.sha256()
-    for source in (*sorted(_KERNELS.glob("*.py")), Path(__file__).with_name("tables.py")):
+    # what every package may call or be compiled for
+    shared = [Path(__file__).with_name(name) for name in ("tables.py", "portable.py")]
+    for source in (*sorted(_KERNELS.glob("*.py")), *shared):
         digest.update(source.read_bytes())
     target = (
         numba.__version__,

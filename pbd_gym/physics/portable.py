@@ -25,16 +25,25 @@ def exp(y: Any) -> np.ndarray:
 
 
 @kernel
+def exp_scalar(y: float) -> float:
+    """Return e^y for one number y <= 0, for use within kernels: the same bits as `exp`.
+
+    e^y = (e^(y/256))^256: a Taylor polynomial on [-0.25, 0], then eight squarings.
+    """
+    small = max(y, -64.0) * (1.0 / 256.0)
+    total = 1.0
+    for degree in range(11, 0, -1):
+        total = 1.0 + total * small * (1.0 / degree)
+    for _ in range(8):
+        total = total * total
+    return total
+
+
+@kernel
 def _exp(values: Any, result: Any) -> None:
-    """e^y = (e^(y/256))^256: a Taylor polynomial on [-0.25, 0], then eight squarings."""
+    """Apply `exp_scalar` elementwise."""
     for index in range(values.shape[0]):
-        small = max(values[index], -64.0) * (1.0 / 256.0)
-        total = 1.0
-        for degree in range(11, 0, -1):
-            total = 1.0 + total * small * (1.0 / degree)
-        for _ in range(8):
-            total = total * total
-        result[index] = total
+        result[index] = exp_scalar(values[index])
 
 
 def cos_sin(angle: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
@@ -15,7 +14,7 @@ from pbd_gym.tasks.driving import drive_pins
 
 Variables = dict[str, np.ndarray]
 # Observations are scaled to about [-1, 1] and clipped here, so that their bounds are finite.
-_OBSERVATION_LIMIT = 10.0
+OBSERVATION_LIMIT = 10.0
 
 
 def number(default: float, low: float, high: float, unit: str = "") -> Any:
@@ -127,7 +126,7 @@ class Task:
         """What `observe` returns for one world."""
         start = self.lowest_start
         size = self.observe(start.x, start.v, start.variables).shape[1]
-        return spaces.Box(-_OBSERVATION_LIMIT, _OBSERVATION_LIMIT, (size,), np.float32)
+        return spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (size,), np.float32)
 
     @cached_property
     def lowest_start(self) -> Start:
@@ -198,7 +197,7 @@ class Task:
         """
         pins, axes, workspace, limits = self._driving
         targets = np.empty((len(x), len(pins), self.model.dim), dtype=x.dtype)
-        short = np.empty(len(x), dtype=x.dtype)
+        short = np.empty(len(x))
         drive_pins(x, v, action, pins, axes, workspace, limits, targets, short)
         return targets, short
 
@@ -230,19 +229,3 @@ def _check_field(spec: Any, value: Any) -> None:
     low, high, unit = spec.metadata["low"], spec.metadata["high"], spec.metadata["unit"]
     if not low <= value <= high:
         raise ValueError(f"{spec.name} is {value!r}; allowed: {low} to {high} {unit}".rstrip())
-
-
-def length(vectors: np.ndarray) -> np.ndarray:
-    """Return the Euclidean length along the last axis, axis after axis: the same bits for any n."""
-    square = vectors[..., 0] * vectors[..., 0]
-    for axis in range(1, vectors.shape[-1]):
-        square = square + vectors[..., axis] * vectors[..., axis]
-    return np.sqrt(square)
-
-
-def mean(values: np.ndarray) -> np.ndarray:
-    """Return the mean along axis 1, summed in order: the same bits for any number of worlds."""
-    return np.cumsum(values, axis=1)[:, -1] / values.dtype.type(values.shape[1])
-
-
-Policy = Callable[[np.ndarray], np.ndarray]

@@ -7,10 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pbd_gym.physics import Snapshot, World
-from pbd_gym.tasks.base import Start, Task, Variables
-
-_LEAST, _GREATEST = np.float32(-1.0), np.float32(1.0)
-_LARGEST = float(np.finfo(np.float32).max)
+from pbd_gym.tasks.base import OBSERVATION_LIMIT, Judgement, Start, Task, Variables
+from pbd_gym.tasks.bookkeeping import (
+    clip_actions,
+    clip_observations,
+    find_diverged,
+    keep_score,
+)
 
 
 class Outcome(NamedTuple):
@@ -44,8 +47,6 @@ class Batch:
         self.variables = {
             name: np.repeat(value, num_worlds, axis=0) for name, value in fresh.items()
         }
-        space = task.observation_space
-        self._least, self._greatest = space.low[0], space.high[0]
         self._draws = sum(len(spec.low) for spec in task.draws.values())
 
     def reset(
@@ -81,7 +82,7 @@ class Batch:
         judgement = self.task.judge(start.x, start.v, action, start.variables)
         return {
             **start.variables,
-            "start_performance": judgement.performance,
+            "start_performance": _float64(judgement.performance),
             "streak": np.zeros(len(start.x), dtype=np.int64),
         }
 
@@ -120,13 +121,35 @@ class Batch:
             )
         return np.broadcast_to(values.astype(np.float64), (worlds, count))
 
-    def check_actions(self, actions: Any) -> np.ndarray:
-        """Return actions as a float32 array (W, size).
+    def step(self, actions: Any) -> Outcome:
+        """Advance every world by one control step.
+
+        Args:
+            actions: (W, size) real numbers; what is beyond [-1, 1] is clipped.
 
         Raises:
             TypeError: If they are not numbers.
-            ValueError: If their shape is wrong or one is not finite.
+            ValueError: If their shape is wrong or one is not finite. Nothing has moved then.
         """
+        task, world = self.task, self.world
+        clipped, excess = self._clip(actions)
+        targets, short = task.pin_targets(world.x, world.v, clipped)
+        world.step(1.0 / task.control_rate, task.substeps, targets)
+        diverged = self._put_back_diverged()
+        judgement = task.judge(world.x, world.v, clipped, self.variables)
+        reward, normalized, success = self._score(judgement, diverged)
+        info = {
+            "is_success": success,
+            "normalized_performance": normalized,
+            **judgement.terms,
+            "action_clipped": excess,
+            "pin_limited": short,
+            "diverged": diverged,
+        }
+        return Outcome(reward, diverged, info)
+
+    def _clip(self, actions: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return actions within [-1, 1] in float32, and by how much each world's were clipped."""
         try:
             array = np.asarray(actions)
         except ValueError as error:
@@ -136,54 +159,54 @@ class Batch:
         expected = (self.world.num_worlds, *self.task.action_space.shape)
         if array.shape != expected:
             raise ValueError(f"actions have shape {array.shape}; expected {expected}")
-        if not np.isfinite(array).all():
+        clipped, excess = np.empty(expected, dtype=np.float32), np.empty(len(array))
+        if not clip_actions(_float64(array), clipped, excess):
             world, index = np.argwhere(~np.isfinite(array))[0]
             raise ValueError(f"action {index} of world {world} is {array[world, index]}")
-        if array.dtype == np.float64:  # numbers that only float64 can hold would become infinite
-            array = np.minimum(np.maximum(array, -_LARGEST), _LARGEST)
-        return array.astype(np.float32)
-
-    def step(self, actions: np.ndarray) -> Outcome:
-        """Advance every world by one control step; actions as `check_actions` returns them."""
-        task, world = self.task, self.world
-        clipped = np.minimum(np.maximum(actions, _LEAST), _GREATEST)
-        targets, short = task.pin_targets(world.x, world.v, clipped)
-        world.step(1.0 / task.control_rate, task.substeps, targets)
-        diverged = self._put_back_diverged()
-        judgement = task.judge(world.x, world.v, clipped, self.variables)
-        streak = self.variables["streak"]
-        streak += 1
-        streak *= judgement.reached & ~diverged
-        start = self.variables["start_performance"]
-        # a world that begins at its best stays defined: nothing to gain, 1 while it is held
-        possible = np.maximum(task.best_performance - start, 1e-6)
-        info = {
-            "is_success": streak >= task.hold_steps,
-            "normalized_performance": 1.0
-            - (task.best_performance - judgement.performance) / possible,
-            **judgement.terms,
-            "action_clipped": np.abs(actions - clipped).max(axis=1),
-            "pin_limited": short,
-            "diverged": diverged,
-        }
-        return Outcome(np.where(diverged, 0.0, judgement.reward), diverged, info)
+        return clipped, excess
 
     def _put_back_diverged(self) -> np.ndarray:
         """Return which worlds left all bounds; they are put back to where the model was built."""
-        x, bound = self.world.x, self.task.sanity_bound
-        # written so that NaN counts as out of bounds
-        if x.max() < bound and x.min() > -bound:
-            return np.zeros(len(x), dtype=bool)
-        diverged = np.asarray(~(np.abs(x) < bound).all(axis=(1, 2)))
-        x[diverged] = self.task.model.positions
-        self.world.v[diverged] = 0.0
+        world, diverged = self.world, np.empty(self.world.num_worlds, dtype=bool)
+        if find_diverged(world.x, self.task.sanity_bound, diverged):
+            world.x[diverged] = self.task.model.positions
+            world.v[diverged] = 0.0
         return diverged
 
-    def observe(self) -> np.ndarray:
-        """Return the observations, a fresh float32 array (W, size) within the space's bounds."""
-        observation = self.task.observe(self.world.x, self.world.v, self.variables)
-        np.maximum(observation, self._least, out=observation)
-        return np.minimum(observation, self._greatest, out=observation)
+    def _score(
+        self, judgement: Judgement, diverged: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return rewards, normalized performances and successes, (W,) each; count the streaks."""
+        worlds = len(diverged)
+        earned, normalized, success = np.empty(worlds), np.empty(worlds), np.empty(worlds, bool)
+        keep_score(
+            _float64(judgement.reward),
+            judgement.reached,
+            _float64(judgement.performance),
+            diverged,
+            self.variables["start_performance"],
+            self.variables["streak"],
+            float(self.task.best_performance),
+            self.task.hold_steps,
+            earned,
+            normalized,
+            success,
+        )
+        return earned, normalized, success
+
+    def observe(self, worlds: np.ndarray | None = None) -> np.ndarray:
+        """Return observations, a fresh float32 array (n, size) within the space's bounds.
+
+        Args:
+            worlds: (n,) indices of the worlds to observe; all of them if not given.
+        """
+        x, v, variables = self.world.x, self.world.v, self.variables
+        if worlds is not None:
+            x, v = x[worlds], v[worlds]
+            variables = {name: value[worlds] for name, value in variables.items()}
+        observations = self.task.observe(x, v, variables)
+        clip_observations(observations, OBSERVATION_LIMIT)
+        return observations
 
     def get_state(self) -> tuple[Snapshot, Variables]:
         """Return copies of all that a continuation depends on."""
@@ -201,6 +224,11 @@ class Batch:
             raise ValueError(f"the state remembers {other}; expected {own}")
         self.world.restore(snapshot)
         self.variables = {name: value.copy() for name, value in variables.items()}
+
+
+def _float64(values: np.ndarray) -> np.ndarray:
+    """Return values as kernels are compiled for them: in float64, side by side in memory."""
+    return np.asarray(values, dtype=np.float64, order="C")
 
 
 def _kinds(variables: Variables) -> dict[str, str]:

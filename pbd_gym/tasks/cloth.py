@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pbd_gym.physics import Model, ModelBuilder, World, shapes
-from pbd_gym.physics.compiling import loaded_lanes
+from pbd_gym.physics.compiling import kernel, loaded_lanes
 from pbd_gym.physics.portable import cos_sin
-from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, length, mean, number
+from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, number
 from pbd_gym.tasks.rewards import closeness
 
 _PI = 3.141592653589793
@@ -190,30 +190,17 @@ class Cloth(Task):
 
     def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
         """Return positions relative to the square, velocities, and the square."""
-        worlds, real = len(x), x.dtype.type
-        places = x[:, self._observed]
-        places[:, :, :2] -= variables["goal"][:, None]
-        return np.concatenate(
-            [
-                (places * real(2.0)).reshape(worlds, -1),
-                v[:, self._observed].reshape(worlds, -1),
-                variables["goal"],
-                variables["goal_axis"],
-            ],
-            axis=1,
-        )
+        observations = np.empty((len(x), 6 * len(self._observed) + 4), dtype=x.dtype)
+        _observe(x, v, variables["goal"], variables["goal_axis"], self._observed, observations)
+        return observations
 
     def judge(
         self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
     ) -> Judgement:
         """Judge by the mean distance of the particles from their places."""
-        places = x.copy()
-        places[:, :, :2] -= variables["goal"][:, None]
-        places = self._in_square(places, variables["goal_axis"])
-        places[:, :, :2] -= self._square.astype(x.dtype)
-        places[:, :, 2] -= x.dtype.type(_TABLE_GAP)
-        distance = mean(length(places)).astype(np.float64)
-        reward = closeness(distance, 0.2 * self.side)
+        distance, reward = np.empty(len(x)), np.empty(len(x))
+        goal, axis = variables["goal"], variables["goal_axis"]
+        _judge(x, goal, axis, self._square, 0.2 * self.side, distance, reward)
         if "start_performance" in variables:
             reached = distance < -0.1 * variables["start_performance"]
         else:
@@ -255,6 +242,57 @@ class Cloth(Task):
         world[:, :, 1] = velocity[:, :, 0] * sine + velocity[:, :, 1] * cosine
         world[:, :, 2] = velocity[:, :, 2]
         return np.clip(world.reshape(-1, 6) / self.max_speed, -1.0, 1.0).astype(np.float32)
+
+
+@kernel
+def _observe(x: Any, v: Any, goal: Any, goal_axis: Any, observed: Any, observations: Any) -> None:
+    """Write the observations of n worlds; see the class for what they hold."""
+    double = x.dtype.type(2)
+    size = 3 * observed.shape[0]
+    for world in range(x.shape[0]):
+        for index in range(observed.shape[0]):
+            particle = observed[index]
+            across, along = x[world, particle, 0], x[world, particle, 1]
+            observations[world, 3 * index] = (across - goal[world, 0]) * double
+            observations[world, 3 * index + 1] = (along - goal[world, 1]) * double
+            observations[world, 3 * index + 2] = x[world, particle, 2] * double
+            for axis in range(3):
+                observations[world, size + 3 * index + axis] = v[world, particle, axis]
+        for axis in range(2):
+            observations[world, 2 * size + axis] = goal[world, axis]
+            observations[world, 2 * size + 2 + axis] = goal_axis[world, axis]
+
+
+@kernel
+def _judge(
+    x: Any, goal: Any, goal_axis: Any, square: Any, scale: float, distance: Any, reward: Any
+) -> None:
+    """Write the mean distances of n worlds' particles from their places [m], and the rewards.
+
+    Args:
+        x: Positions (n, N, 3) [m].
+        goal: Centres of the squares (n, 2) [m].
+        goal_axis: Cosines and sines of their yaws (n, 2).
+        square: Places of the particles on a square around the origin, (N, 2) [m].
+        scale: Distance at which the reward is 1/e [m].
+        distance: (n,), written.
+        reward: (n,), written.
+    """
+    count = x.shape[1]
+    for world in range(x.shape[0]):
+        cosine, sine = np.float64(goal_axis[world, 0]), np.float64(goal_axis[world, 1])
+        total = 0.0
+        for particle in range(count):
+            across, along = (
+                x[world, particle, 0] - goal[world, 0],
+                x[world, particle, 1] - goal[world, 1],
+            )
+            right = across * cosine + along * sine - square[particle, 0]
+            up = along * cosine - across * sine - square[particle, 1]
+            above = x[world, particle, 2] - _TABLE_GAP
+            total += np.sqrt(right * right + up * up + above * above)
+        distance[world] = total / count
+        reward[world] = closeness(distance[world], scale)
 
 
 def _turn(points: np.ndarray, yaw: np.ndarray) -> np.ndarray:

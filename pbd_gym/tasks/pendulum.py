@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pbd_gym.physics import Model, ModelBuilder, shapes
+from pbd_gym.physics.compiling import kernel
 from pbd_gym.physics.portable import cos_sin
 from pbd_gym.tasks.balancing import SwingUp
-from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, length, number
+from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, number
 from pbd_gym.tasks.rewards import near, quiet
 
 _PI = 3.141592653589793
@@ -138,44 +139,30 @@ class Pendulum(Task):
         x[:, :, 0] += quantities["pivot"]
         return Start(x.astype(np.float32), v.astype(np.float32), {})
 
-    def _links(self, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return each link as a vector and its rate of change in link lengths, (n, links, 2)."""
-        scale = x.dtype.type(1.0 / self.link_length)
-        return (x[:, 1:] - x[:, :-1]) * scale, (v[:, 1:] - v[:, :-1]) * scale
+    @cached_property
+    def _scales(self) -> np.ndarray:
+        """What the pivot's position and velocity, directions and their rates are multiplied by."""
+        link = 1.0 / self.link_length
+        scales = [1.0 / self.rail, 1.0 / self.max_speed, link, 0.2 * link]
+        return np.array(scales, dtype=np.float32)
 
     def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
         """Return the pivot, the links' directions and their rates of change."""
-        worlds, real = len(x), x.dtype.type
-        direction, motion = self._links(x, v)
-        return np.concatenate(
-            [
-                x[:, 0, :1] * real(1.0 / self.rail),
-                v[:, 0, :1] * real(1.0 / self.max_speed),
-                direction.reshape(worlds, -1),
-                motion.reshape(worlds, -1) * real(0.2),
-            ],
-            axis=1,
-        )
+        observations = np.empty((len(x), 2 + 4 * self.links), dtype=x.dtype)
+        _observe(x, v, self._scales, observations)
+        return observations
 
     def judge(
         self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
     ) -> Judgement:
         """Judge as dm_control judges its cart-pole."""
-        direction, motion = (part.astype(np.float64) for part in self._links(x, v))
-        height = np.clip(direction[:, :, 1], -1.0, 1.0)
-        pivot = x[:, 0, 0].astype(np.float64)
-        upright = np.cumsum(0.5 * (1.0 + height), axis=1)[:, -1] / self.links
-        terms = {
-            "upright": upright,
-            "centred": near(pivot, self.rail),
-            # links keep their length, so the rate of a direction is the angular velocity
-            "slow": near(length(motion), 5.0).min(axis=1),
-            "quiet": quiet(action[:, 0]),
-        }
-        reward = upright * (1.0 + terms["centred"]) * (1.0 + terms["slow"]) * (4.0 + terms["quiet"])
+        parts = np.empty((5, len(x)))
+        reached = np.empty(len(x), dtype=bool)
         least = 0.99 if self.links == 1 else 0.98
-        reached = (height > least).all(axis=1) & (np.abs(pivot) < 0.75 * self.rail)
-        return Judgement(reward / 20.0, reached, upright, terms)
+        _judge(x, v, action, self.link_length, self.rail, least, parts, reached)
+        upright, centred, slow, still, reward = parts
+        terms = {"upright": upright, "centred": centred, "slow": slow, "quiet": still}
+        return Judgement(reward, reached, upright, terms)
 
     @cached_property
     def _swing_up(self) -> SwingUp:
@@ -200,3 +187,62 @@ class Pendulum(Task):
             direction=observation[:, 2 : 2 + count].reshape(shape),
             motion=observation[:, 2 + count :].reshape(shape) * 5.0,
         )
+
+
+@kernel
+def _observe(x: Any, v: Any, scales: Any, observations: Any) -> None:
+    """Write the observations of n worlds; see the class for what they hold."""
+    links = x.shape[1] - 1
+    for world in range(x.shape[0]):
+        observations[world, 0] = x[world, 0, 0] * scales[0]
+        observations[world, 1] = v[world, 0, 0] * scales[1]
+        for link in range(links):
+            for axis in range(2):
+                along = x[world, link + 1, axis] - x[world, link, axis]
+                rate = v[world, link + 1, axis] - v[world, link, axis]
+                observations[world, 2 + 2 * link + axis] = along * scales[2]
+                observations[world, 2 + 2 * (links + link) + axis] = rate * scales[3]
+
+
+@kernel
+def _judge(
+    x: Any,
+    v: Any,
+    action: Any,
+    link_length: float,
+    rail: float,
+    least: float,
+    parts: Any,
+    reached: Any,
+) -> None:
+    """Judge n worlds.
+
+    Args:
+        x: Positions (n, N, 2) [m].
+        v: Velocities (n, N, 2) [m/s].
+        action: (n, 1) in [-1, 1].
+        link_length: [m].
+        rail: Half the rail [m].
+        least: cos theta of every link above which the pendulum is up.
+        parts: (5, n): upright, centred, slow, quiet and reward, written.
+        reached: (n,) bool, written.
+    """
+    links = x.shape[1] - 1
+    for world in range(x.shape[0]):
+        pivot = np.float64(x[world, 0, 0])
+        total, slow, up = 0.0, 1.0, True
+        for link in range(links):
+            height = np.float64(x[world, link + 1, 1] - x[world, link, 1]) / link_length
+            height = min(max(height, -1.0), 1.0)
+            total += 0.5 * (1.0 + height)
+            up &= height > least
+            # links keep their length, so the rate of a direction is the angular velocity
+            across = np.float64(v[world, link + 1, 0] - v[world, link, 0]) / link_length
+            along = np.float64(v[world, link + 1, 1] - v[world, link, 1]) / link_length
+            slow = min(slow, near(np.sqrt(across * across + along * along), 5.0))
+        upright, centred = total / links, near(pivot, rail)
+        still = quiet(np.float64(action[world, 0]))
+        reward = upright * (1.0 + centred) * (1.0 + slow) * (4.0 + still) / 20.0
+        parts[0, world], parts[1, world], parts[2, world] = upright, centred, slow
+        parts[3, world], parts[4, world] = still, reward
+        reached[world] = up and abs(pivot) < 0.75 * rail

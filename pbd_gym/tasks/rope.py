@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pbd_gym.physics import Model, ModelBuilder, shapes
-from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, length, number
+from pbd_gym.physics.compiling import kernel
+from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, number
 from pbd_gym.tasks.rewards import closeness
 
 
@@ -117,33 +118,10 @@ class Rope(Task):
         return Start(x, np.zeros_like(x), {"goal": quantities["goal"].astype(np.float32)})
 
     @cached_property
-    def _observed(self) -> np.ndarray | slice:
-        """Where the observed particles below the gripper stand."""
-        if self.observation == "particles":
-            return slice(1, None)  # no index array: that would copy twice
-        return np.round(np.linspace(0, self.particles - 1, 10)).astype(np.int64)[1:]
-
-    @property
-    def _num_observed(self) -> int:
-        """Number of observed particles below the gripper."""
-        return (self.particles if self.observation == "particles" else 10) - 1
-
-    def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
-        """Return gripper, rope relative to the gripper, and goal relative to the gripper."""
-        worlds, count, gripper = len(x), self._num_observed, x[:, 0]
-        real, scale = x.dtype.type, x.dtype.type(1.0 / self.length)
-        observation = np.empty((worlds, 4 * count + 6), dtype=x.dtype)
-        observation[:, 0:2] = gripper - self._centre
-        observation[:, 2:4] = v[:, 0] * real(1.0 / self.max_speed)
-        shape = observation[:, 4 : 4 + 2 * count].reshape(worlds, count, 2)  # views, not copies
-        motion = observation[:, 4 + 2 * count : -2].reshape(worlds, count, 2)
-        for axis in range(2):  # long inner loops over particles, not short ones over axes
-            along = x[:, self._observed, axis]
-            np.subtract(along, gripper[:, axis, None], out=shape[:, :, axis])
-        shape *= scale
-        np.multiply(v[:, self._observed], real(0.5), out=motion)
-        observation[:, -2:] = (variables["goal"] - gripper) * scale
-        return observation
+    def _observed(self) -> np.ndarray:
+        """The observed particles below the gripper."""
+        count = self.particles if self.observation == "particles" else 10
+        return np.round(np.linspace(0, self.particles - 1, count)).astype(np.int64)[1:]
 
     @cached_property
     def _centre(self) -> np.ndarray:
@@ -151,12 +129,24 @@ class Rope(Task):
         lower, upper = self.workspace()
         return (0.5 * (lower + upper)).astype(np.float32)
 
+    @cached_property
+    def _scales(self) -> np.ndarray:
+        """What the gripper's velocity, lengths and other velocities are multiplied by."""
+        return np.array([1.0 / self.max_speed, 1.0 / self.length, 0.5], dtype=np.float32)
+
+    def observe(self, x: np.ndarray, v: np.ndarray, variables: Variables) -> np.ndarray:
+        """Return gripper, rope relative to the gripper, and goal relative to the gripper."""
+        observations = np.empty((len(x), 4 * len(self._observed) + 6), dtype=x.dtype)
+        goal = variables["goal"]
+        _observe(x, v, goal, self._observed, self._centre, self._scales, observations)
+        return observations
+
     def judge(
         self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
     ) -> Judgement:
         """Judge by the distance of the free end from the goal."""
-        distance = length(x[:, -1] - variables["goal"]).astype(np.float64)
-        reward = closeness(distance, 0.2 * self.length)
+        distance, reward = np.empty(len(x)), np.empty(len(x))
+        _judge(x, variables["goal"], 0.2 * self.length, distance, reward)
         return Judgement(reward, distance < self.goal_radius, -distance, {"distance": distance})
 
     def goal(self, variables: Variables, world: int) -> np.ndarray:
@@ -172,8 +162,8 @@ class Rope(Task):
 
     def scripted(self, observation: np.ndarray) -> np.ndarray:
         """Bring the gripper above the goal; follow the rope's middle to take the sway out."""
-        count = 2 * self._num_observed
-        shape = (len(observation), self._num_observed, 2)
+        count = 2 * len(self._observed)
+        shape = (len(observation), len(self._observed), 2)
         hang = observation[:, 4 : 4 + count].reshape(shape).mean(axis=1) * self.length
         drift = observation[:, 4 + count : 4 + 2 * count].reshape(shape).mean(axis=1) * 2.0
         drift -= observation[:, 2:4] * self.max_speed
@@ -181,3 +171,36 @@ class Rope(Task):
         velocity *= (1.5, 3.0)
         velocity[:, 0] += 4.0 * hang[:, 0] - 0.2 * drift[:, 0]
         return np.clip(velocity / self.max_speed, -1.0, 1.0).astype(np.float32)
+
+
+@kernel
+def _observe(
+    x: Any, v: Any, goal: Any, observed: Any, centre: Any, scales: Any, observations: Any
+) -> None:
+    """Write the observations of n worlds; see the class for what they hold."""
+    motion = 4 + 2 * observed.shape[0]  # where the velocities begin
+    last = motion + 2 * observed.shape[0]
+    for world in range(x.shape[0]):
+        for axis in range(2):
+            gripper = x[world, 0, axis]
+            observations[world, axis] = gripper - centre[axis]
+            observations[world, 2 + axis] = v[world, 0, axis] * scales[0]
+            observations[world, last + axis] = (goal[world, axis] - gripper) * scales[1]
+        for index in range(observed.shape[0]):
+            particle = observed[index]
+            for axis in range(2):
+                apart = x[world, particle, axis] - x[world, 0, axis]
+                observations[world, 4 + 2 * index + axis] = apart * scales[1]
+                observations[world, motion + 2 * index + axis] = (
+                    v[world, particle, axis] * scales[2]
+                )
+
+
+@kernel
+def _judge(x: Any, goal: Any, scale: float, distance: Any, reward: Any) -> None:
+    """Write the distances of n free ends from their goals (n,) [m], and the rewards (n,)."""
+    for world in range(x.shape[0]):
+        across = np.float64(x[world, -1, 0] - goal[world, 0])
+        along = np.float64(x[world, -1, 1] - goal[world, 1])
+        distance[world] = np.sqrt(across * across + along * along)
+        reward[world] = closeness(distance[world], scale)
