@@ -66,7 +66,9 @@ def test_a_world_out_of_bounds_is_terminated_and_put_back_and_the_others_go_on(v
     env, twin = (make_vec("PBDRope-v0", 3) for _ in range(2))
     env.reset(seed=0)
     twin.reset(seed=0)
-    env.unwrapped._batch.world.x[1, 5] = value
+    state = env.unwrapped.get_state()
+    state.worlds.x[1, 5] = value
+    env.unwrapped.set_state(state)
     observation, reward, terminated, _, info = env.step(nothing(env))
     expected, *_ = twin.step(nothing(twin))
     assert terminated.tolist() == info["diverged"].tolist() == [False, True, False]

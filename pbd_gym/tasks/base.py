@@ -82,6 +82,9 @@ class Task:
     `hold_steps` (number of steps in a row for which the goal must be met), `best_performance`, and
     `action_axes` (the axes along which an action moves each pin).
 
+    `observe` and `judge` may be plain NumPy. Those of the built-in tasks call compiled loops over
+    the worlds: for one world, small NumPy calls would take longer than its physics.
+
     Raises:
         TypeError: For a keyword that does not exist or a value of another kind.
         ValueError: For a value out of range.

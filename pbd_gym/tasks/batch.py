@@ -8,12 +8,7 @@ import numpy as np
 
 from pbd_gym.physics import Snapshot, World
 from pbd_gym.tasks.base import OBSERVATION_LIMIT, Judgement, Start, Task, Variables
-from pbd_gym.tasks.bookkeeping import (
-    clip_actions,
-    clip_observations,
-    find_diverged,
-    keep_score,
-)
+from pbd_gym.tasks.bookkeeping import clip_actions, clip_observations, find_diverged, keep_score
 
 
 class Outcome(NamedTuple):
@@ -159,10 +154,11 @@ class Batch:
         expected = (self.world.num_worlds, *self.task.action_space.shape)
         if array.shape != expected:
             raise ValueError(f"actions have shape {array.shape}; expected {expected}")
-        clipped, excess = np.empty(expected, dtype=np.float32), np.empty(len(array))
-        if not clip_actions(_float64(array), clipped, excess):
-            world, index = np.argwhere(~np.isfinite(array))[0]
-            raise ValueError(f"action {index} of world {world} is {array[world, index]}")
+        wide = _float64(array)
+        clipped, excess = np.empty(expected, dtype=np.float32), np.empty(len(wide))
+        if not clip_actions(wide, clipped, excess):
+            world, index = np.argwhere(~np.isfinite(wide))[0]
+            raise ValueError(f"action {index} of world {world} is {wide[world, index]}")
         return clipped, excess
 
     def _put_back_diverged(self) -> np.ndarray:
