@@ -147,6 +147,7 @@ class Timing(NamedTuple):
         decay: exp(-damping h).
         rest_speed: Speed below which impacts do not bounce [m/s].
         gravity: Size of gravity [m/s2].
+        speed_limit: That no free particle exceeds [m/s].
     """
 
     dt: Any
@@ -156,6 +157,7 @@ class Timing(NamedTuple):
     decay: Any
     rest_speed: Any
     gravity: Any
+    speed_limit: Any
 
 
 def as_read(table: Any, dtype: np.dtype) -> Any:

@@ -21,6 +21,8 @@ _BATCH_LANES = 32
 _FEWEST_PARTICLES_FOR_THREADS = 4096
 # Candidate pairs of self-collision that a world can hold, per particle.
 _PAIRS_PER_PARTICLE = 24
+# No particle is ever faster; what a failed solve throws about comes back [m/s].
+_SPEED_LIMIT = 1000.0
 # Beyond these h or 1/h^2 would leave the range of float32.
 _SHORTEST_SUBSTEP = 1e-9
 _LONGEST_STEP = 1e3
@@ -133,7 +135,7 @@ class World:
 
     def _scratch(self) -> tuple[Any, ...]:
         """Return the scratch of one thread: work, and that of self-collision or None."""
-        shape = (self.model.num_particles + 1, self._kernels.WIDTH)
+        shape = (self.model.num_particles + 2, self._kernels.WIDTH)
         work = np.zeros(shape, dtype=self.dtype)
         if self.model.self_collision is None:
             return work, None
@@ -207,7 +209,7 @@ class World:
         gravity = float(np.sqrt(np.sum(self.model.gravity**2)))
         decay = float(portable.exp(-self.model.damping * h))
         # impacts slower than what gravity gives within two substeps are resting contacts
-        timing = Timing(dt, h, 1.0 / h, 1.0 / h**2, decay, 2.0 * gravity * h, gravity)
+        timing = Timing(dt, h, 1.0 / h, 1.0 / h**2, decay, 2.0 * gravity * h, gravity, _SPEED_LIMIT)
         self._timing = as_read(timing, self.dtype)
         self._substeps = int(substeps)
         self._warm_up()

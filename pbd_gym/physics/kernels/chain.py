@@ -154,48 +154,33 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
     """Eliminate the link before this one; the direction is that of the start of the substep.
 
     C = (|x_a - x_b|^2 - rest^2) / (2 rest) has the gradient (x_a - x_b)/rest: no square root, and
-    with corrections along the start direction the system is no longer symmetric. Where a link has
-    turned so far within the substep that the start direction does not lead back to its length, its
-    current direction and C = |x_a - x_b| - rest are taken.
+    with corrections along the start direction the system is no longer symmetric.
     """
     real = type(a[0])
     one, zero, half = real(1), real(0), real(0.5)
     floor = real(_PIVOT_FLOOR)
     inverse = one / rest
     for lane in range(LANES):
-        square, aligned, square_start = zero, zero, zero
-        for k in range(DIM):
-            now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
-            start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
-            square += now * now
-            aligned += now * start
-            square_start += start * start
-        length = np.sqrt(square)
-        # the line along the start direction must meet the sphere of radius rest, with a margin
-        off = square * square_start - aligned * aligned
-        turned = aligned <= zero or off > half * rest * rest * square_start
-        current = one / length if length > zero else zero
-        scale = current if turned else inverse
-        own, lower, upper = zero, zero, zero
+        square, own, lower, upper = zero, zero, zero, zero
         for k in range(DIM):
             now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
             link_before = before[POSITION + k * LANES + lane] - a[POSITION + k * LANES + lane]
-            direction = (now if turned else start) * scale
-            own += now * scale * direction
-            lower += now * scale * before[DIRECTION + k * LANES + lane]
+            direction = start * inverse
+            square += now * now
+            own += now * inverse * direction
+            lower += now * inverse * before[DIRECTION + k * LANES + lane]
             upper += link_before * before[SCALE + lane] * direction
             a[DIRECTION + k * LANES + lane] = direction
-        a[SCALE + lane] = scale
+        a[SCALE + lane] = inverse
         w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
         diagonal = (w_a + w_b) * own + alpha
         factor = -w_a * lower * before[PIVOT + lane]
         coupling = -w_a * upper
         pivot = max(diagonal - factor * coupling, floor * diagonal)
-        error = (length - rest) if turned else half * (square * inverse - rest)
         a[COUPLING + lane] = coupling
         a[PIVOT + lane] = one / pivot if pivot > zero else zero
-        a[MULTIPLIER + lane] = error - factor * before[MULTIPLIER + lane]
+        a[MULTIPLIER + lane] = half * (square * inverse - rest) - factor * before[MULTIPLIER + lane]
 
 
 @kernel

@@ -1,9 +1,10 @@
 """Where the quantities of a particle stand in its row of the scratch array.
 
-The scratch of a tile of worlds is `(particles + 1, WIDTH)`: one row holds everything of one
+The scratch of a tile of worlds is `(particles + 2, WIDTH)`: one row holds everything of one
 particle, component after component, each LANES numbers wide. A constraint touches two or three
 rows, and LLVM can prove with as many comparisons that its lane loop may be vectorised. The last
-row stays zero: it stands for the missing neighbour of a chain's first and last link.
+row stays zero: it stands for the missing neighbour of a chain's first and last link. The row before
+it marks the lanes in which a solve has failed.
 """
 
 from . import DIM, LANES
@@ -18,4 +19,5 @@ PIVOT = COUPLING + LANES  # reciprocal pivot of the elimination
 MULTIPLIER = PIVOT + LANES  # right-hand side, then the link's multiplier
 SCALE = MULTIPLIER + LANES  # 1/length that turns the link into its gradient
 MASS = SCALE + LANES  # inverse mass, where it differs from lane to lane
-WIDTH = MASS + LANES
+KEPT = MASS + LANES  # position that a failed solve must not touch
+WIDTH = KEPT + DIM * LANES

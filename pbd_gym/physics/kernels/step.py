@@ -1,5 +1,7 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
+import numpy as np
+
 from ..compiling import kernel, row
 from .chain import (
     limit_strains,
@@ -9,6 +11,7 @@ from .chain import (
 )
 from .collision import collide_with_self, find_pairs
 from .contact import collide_with_walls, read_velocities
+from .fallback import count_failures, return_to_prediction, take_up_kept
 from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
 from .sweep import (
     project_bends,
@@ -16,6 +19,9 @@ from .sweep import (
     project_distances,
     project_distances_from_start,
 )
+
+# Iterations of the first-order solve that replaces a failed one.
+_AGAIN = 4
 
 __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
@@ -45,11 +51,16 @@ def advance(x, v, targets, tiles, work, found, model, timing, substeps):
             remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
             _predict(work, masses, timing, model.second_order)
             _move_pins(x, targets, tile, work, masses.pins, remaining)
-            _project(work, model, found, timing, model.second_order)
+            _project(work, model, found, timing, model.iterations, model.second_order)
+            _project_again(work, model, found, timing, model.second_order)
             collide_with_walls(work, masses, model.room)
             limit_strains(work, masses, model.chains)
+            _limit_moves(work, masses, timing.speed_limit * timing.h)
             read_velocities(work, masses, model.room, timing.inverse_h, timing.rest_speed)
             _finish(work, model, timing, model.second_order)
+        # 0 times infinity is no number: pins too are put where they belong after a failed solve
+        _aim_pins(x, targets, tile, work, masses.pins, timing)
+        _move_pins(x, targets, tile, work, masses.pins, x.dtype.type(0))
         _store(x, v, tile, work)
 
 
@@ -127,10 +138,10 @@ def _predict(work, masses, timing, second_order):
 
 
 @kernel
-def _project(work, model, found, timing, second_order):
+def _project(work, model, found, timing, iterations, second_order):
     """Step 4: satisfy the constraints. Soft ones first, chains after them, contacts last."""
     masses, inverse_h2 = model.particles, timing.inverse_h2
-    for iteration in range(model.iterations):
+    for iteration in range(iterations):
         if iteration == 0:
             project_bends(work, masses, model.bends, inverse_h2)
             collide_with_self(work, masses, model.self_collision, found, timing.h, timing.gravity)
@@ -140,6 +151,64 @@ def _project(work, model, found, timing, second_order):
         else:
             project_distances(work, masses, model.distances, inverse_h2, iteration)
             project_chains(work, masses, model.chains, inverse_h2, iteration)
+
+
+@kernel
+def _project_again(work, model, found, timing, second_order):
+    """Solve the substep in first order where the second-order solve has failed."""
+    if second_order is None:
+        return
+    if count_failures(work, model.chains, model.distances) > 0:
+        return_to_prediction(work, model.particles, timing.h)
+        _project(work, model, found, timing, max(model.iterations, _AGAIN), None)
+        take_up_kept(work, model.particles)
+
+
+@kernel
+def _limit_moves(work, masses, reach):
+    """Let no free particle move farther than `reach` in a substep.
+
+    A solve that fails (links that turn through half a circle within a substep, constraints that
+    contradict each other) may send a particle anywhere, even nowhere (NaN); that one stays.
+    """
+    for particle in range(masses.inverse_mass.shape[0]):
+        if masses.inverse_mass[particle] > 0:
+            at = row(work, particle)
+            for lane in range(LANES):
+                square = reach * 0
+                for k in range(DIM):
+                    move = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
+                    square += move * move
+                share = _share_within(square, reach)
+                for k in range(DIM):
+                    now, start = at[POSITION + k * LANES + lane], at[START + k * LANES + lane]
+                    limited = start + share * (now - start) if share > 0 else start
+                    at[POSITION + k * LANES + lane] = now if share == 1 else limited
+
+
+@kernel
+def _limit_velocities(work, masses, speed):
+    """Let no free particle be faster than `speed`; as `_limit_moves`, after velocities changed."""
+    for particle in range(masses.inverse_mass.shape[0]):
+        if masses.inverse_mass[particle] > 0:
+            at = row(work, particle)
+            for lane in range(LANES):
+                square = speed * 0
+                for k in range(DIM):
+                    square += at[VELOCITY + k * LANES + lane] * at[VELOCITY + k * LANES + lane]
+                share = _share_within(square, speed)
+                for k in range(DIM):
+                    now = at[VELOCITY + k * LANES + lane]
+                    at[VELOCITY + k * LANES + lane] = share * now if share > 0 else speed * 0
+
+
+@kernel
+def _share_within(square, longest):
+    """Return by how much to shorten a vector of a square length; 0 if it is not a number."""
+    real = type(longest)
+    if square <= longest * longest:
+        return real(1)
+    return longest / np.sqrt(square) if square < real(np.inf) else real(0)
 
 
 @kernel
@@ -159,3 +228,4 @@ def _finish(work, model, timing, second_order):
                     at[VELOCITY + lane] += kick
     project_distance_velocities(work, masses, model.distances)
     project_chain_velocities(work, masses, model.chains)
+    _limit_velocities(work, masses, timing.speed_limit)

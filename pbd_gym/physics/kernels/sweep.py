@@ -84,17 +84,15 @@ def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
             square += now * now
             aligned += now * start
-        turned = aligned < half * rest * rest
-        slope = (square if turned else aligned) * inverse * inverse
+        slope = max(aligned, zero) * inverse * inverse
         w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
         total = (w_a + w_b) * slope + alpha
         scale = (
             stiffness * half * (square * inverse - rest) * inverse / total if total > zero else zero
         )
         for k in range(DIM):
-            now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
-            move = scale * (now if turned else start)
+            move = scale * start
             a[POSITION + k * LANES + lane] -= w_a * move
             b[POSITION + k * LANES + lane] += w_b * move
 
