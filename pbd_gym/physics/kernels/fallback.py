@@ -1,51 +1,60 @@
-"""Where a second-order solve fails: the substep is solved again in first order.
+"""What is done where a solve fails.
 
-Along the directions of the substep's start a link cannot be brought to its length once it has
+Second order: along the directions of the substep's start a link cannot be brought to its length once it has
 turned too far, and Newton's method does not arrive where light particles whip between heavy ones.
-Left alone, the error would feed the next substep and energy would grow without bound. First-order
-projection takes energy out instead.
+Left alone, the error would feed the next substep and energy would grow without bound. The substep
+is solved again in first order, which takes energy out instead.
+
+Any order: constraints that contradict each other may send a particle anywhere. A control step that
+ends beyond the speed limit is taken again with every substep held within it.
 """
 
 import numpy as np
 
 from ..compiling import kernel, row
-from .layout import DIM, KEPT, LANES, POSITION, START, VELOCITY
+from .layout import DIM, FAILED, KEPT, LANES, POSITION, START, TOO_FAST, VELOCITY
 
 # Error of a rigid length beyond which the solve has failed, as a share of it.
 _LENGTH_ERROR = 0.02
 # The same for a soft length: beyond this its squared form is far from Hooke's law.
 _STRETCH = 0.5
-# Cosine of the greatest angle through which a link may turn within a substep.
-_TURN = 0.5
+# Squared cosine of the greatest angle through which a link may turn within a substep.
+_TURN = 0.25
 
 
 @kernel
-def count_failures(work, chains, distances):
-    """Mark the lanes in which the second-order solve has failed; return how many there are."""
-    failed = row(work, work.shape[0] - 2)
+def has_failed(work, chains, distances):
+    """Mark the lanes in which the second-order solve has failed; tell whether there are any."""
+    marks = row(work, work.shape[0] - 2)
     for lane in range(LANES):
-        failed[lane] = 0
+        marks[FAILED + lane] = 0
     for chain in range(chains.offsets.shape[0] - 1):
         for entry in range(chains.offsets[chain], chains.offsets[chain + 1] - 1):
             a, b = row(work, chains.particles[entry]), row(work, chains.particles[entry + 1])
-            _mark(a, b, chains.rest[entry], chains.compliance[entry], failed)
+            _mark(a, b, chains.rest[entry], chains.compliance[entry], marks)
     for index in range(distances.rest.shape[0]):
         a, b = row(work, distances.pairs[index, 0]), row(work, distances.pairs[index, 1])
         # a soft one leaves an error in its length
         soft = distances.compliance[index] + (1 - distances.stiffness[index])
-        _mark(a, b, distances.rest[index], soft, failed)
-    count = 0
-    for lane in range(LANES):
-        count += 1 if failed[lane] > 0 else 0
-    return count
+        _mark(a, b, distances.rest[index], soft, marks)
+    return _is_marked(marks, FAILED)
 
 
 @kernel
-def _mark(a, b, rest, compliance, failed):
+def _is_marked(marks, quantity):
+    marked = False
+    for lane in range(LANES):
+        marked = marked or marks[quantity + lane] > 0
+    return marked
+
+
+@kernel
+def _mark(a, b, rest, compliance, marks):
     real = type(rest)
     one, zero = real(1), real(0)
-    tolerated = rest * (real(_LENGTH_ERROR) if compliance == zero else real(_STRETCH))
-    cosine = real(_TURN)
+    tolerated = real(_LENGTH_ERROR if compliance == zero else _STRETCH)
+    least, greatest = rest * (one - tolerated), rest * (one + tolerated)
+    cosine2 = real(_TURN)
     for lane in range(LANES):
         square, aligned, square_start = zero, zero, zero
         for k in range(DIM):
@@ -55,9 +64,9 @@ def _mark(a, b, rest, compliance, failed):
             aligned += now * start
             square_start += start * start
         # written so that what is no number has failed too
-        in_length = abs(np.sqrt(square) - rest) <= tolerated
-        in_line = aligned >= cosine * np.sqrt(square * square_start)
-        failed[lane] = failed[lane] if in_length and in_line else one
+        in_length = least * least <= square and square <= greatest * greatest
+        in_line = aligned >= zero and aligned * aligned >= cosine2 * square * square_start
+        marks[FAILED + lane] = marks[FAILED + lane] if in_length and in_line else one
 
 
 @kernel
@@ -74,11 +83,72 @@ def return_to_prediction(work, masses, h):
 @kernel
 def take_up_kept(work, masses):
     """Return to what was kept in the lanes that have not failed."""
-    failed = row(work, work.shape[0] - 2)
+    marks = row(work, work.shape[0] - 2)
     for particle in range(masses.inverse_mass.shape[0]):
         if masses.inverse_mass[particle] > 0:
             at = row(work, particle)
             for k in range(DIM):
                 for lane in range(LANES):
                     again, kept = at[POSITION + k * LANES + lane], at[KEPT + k * LANES + lane]
-                    at[POSITION + k * LANES + lane] = again if failed[lane] > 0 else kept
+                    at[POSITION + k * LANES + lane] = again if marks[FAILED + lane] > 0 else kept
+
+
+@kernel
+def is_too_fast(work, masses, limit):
+    """Mark the lanes in which all speeds together exceed a limit; tell whether there are any."""
+    marks = row(work, work.shape[0] - 2)
+    for lane in range(LANES):
+        marks[TOO_FAST + lane] = 0
+    for particle in range(masses.inverse_mass.shape[0]):
+        at = row(work, particle)
+        for k in range(DIM):
+            for lane in range(LANES):
+                speed = at[VELOCITY + k * LANES + lane]
+                marks[TOO_FAST + lane] += speed * speed
+    for lane in range(LANES):
+        # what is no number is too fast too
+        marks[TOO_FAST + lane] = 0 if marks[TOO_FAST + lane] <= limit * limit else 1
+    return _is_marked(marks, TOO_FAST)
+
+
+@kernel
+def limit_moves(work, masses, reach):
+    """Let no free particle move farther than `reach` in a substep; put back what is no number."""
+    for particle in range(masses.inverse_mass.shape[0]):
+        if masses.inverse_mass[particle] > 0:
+            at = row(work, particle)
+            for lane in range(LANES):
+                square = reach * 0
+                for k in range(DIM):
+                    move = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
+                    square += move * move
+                share = _share_within(square, reach)
+                for k in range(DIM):
+                    now, start = at[POSITION + k * LANES + lane], at[START + k * LANES + lane]
+                    limited = start + share * (now - start) if share > 0 else start
+                    at[POSITION + k * LANES + lane] = now if share == 1 else limited
+
+
+@kernel
+def limit_velocities(work, masses, speed):
+    """Let no free particle be faster than `speed`; stop what is no number."""
+    for particle in range(masses.inverse_mass.shape[0]):
+        if masses.inverse_mass[particle] > 0:
+            at = row(work, particle)
+            for lane in range(LANES):
+                square = speed * 0
+                for k in range(DIM):
+                    square += at[VELOCITY + k * LANES + lane] * at[VELOCITY + k * LANES + lane]
+                share = _share_within(square, speed)
+                for k in range(DIM):
+                    now = at[VELOCITY + k * LANES + lane]
+                    at[VELOCITY + k * LANES + lane] = share * now if share > 0 else speed * 0
+
+
+@kernel
+def _share_within(square, longest):
+    """Return by how much to shorten a vector of a square length; 0 if it is not a number."""
+    real = type(longest)
+    if square <= longest * longest:
+        return real(1)
+    return longest / np.sqrt(square) if square < real(np.inf) else real(0)

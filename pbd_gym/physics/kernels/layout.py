@@ -4,7 +4,7 @@ The scratch of a tile of worlds is `(particles + 2, WIDTH)`: one row holds every
 particle, component after component, each LANES numbers wide. A constraint touches two or three
 rows, and LLVM can prove with as many comparisons that its lane loop may be vectorised. The last
 row stays zero: it stands for the missing neighbour of a chain's first and last link. The row before
-it marks the lanes in which a solve has failed.
+it holds marks of lanes.
 """
 
 from . import DIM, LANES
@@ -21,3 +21,7 @@ SCALE = MULTIPLIER + LANES  # 1/length that turns the link into its gradient
 MASS = SCALE + LANES  # inverse mass, where it differs from lane to lane
 KEPT = MASS + LANES  # position that a failed solve must not touch
 WIDTH = KEPT + DIM * LANES
+
+# In the row before the last:
+FAILED = 0  # 1 where a second-order solve has failed
+TOO_FAST = LANES  # 1 where a control step has ended beyond the speed limit

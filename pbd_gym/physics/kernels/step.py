@@ -1,8 +1,6 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
-import numpy as np
-
-from ..compiling import kernel, row
+from ..compiling import borrowed, kernel, row
 from .chain import (
     limit_strains,
     project_chain_velocities,
@@ -11,8 +9,15 @@ from .chain import (
 )
 from .collision import collide_with_self, find_pairs
 from .contact import collide_with_walls, read_velocities
-from .fallback import count_failures, return_to_prediction, take_up_kept
-from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
+from .fallback import (
+    has_failed,
+    is_too_fast,
+    limit_moves,
+    limit_velocities,
+    return_to_prediction,
+    take_up_kept,
+)
+from .layout import DIM, LANES, POSITION, START, TOO_FAST, VELOCITY, WIDTH
 from .sweep import (
     project_bends,
     project_distance_velocities,
@@ -42,26 +47,36 @@ def advance(x, v, targets, tiles, work, found, model, timing, substeps):
         timing: The Timing.
         substeps: Number of substeps.
     """
+    x, v, targets, work, found, model = borrowed((x, v, targets, work, found, model))
     masses = model.particles
     for tile in range(tiles[0], tiles[1]):
-        _load(x, v, tile, work)
-        _aim_pins(x, targets, tile, work, masses.pins, timing)
-        find_pairs(work, masses, model.self_collision, found, timing.dt)
-        for substep in range(substeps):
-            remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
-            _predict(work, masses, timing, model.second_order)
-            _move_pins(x, targets, tile, work, masses.pins, remaining)
-            _project(work, model, found, timing, model.iterations, model.second_order)
-            _project_again(work, model, found, timing, model.second_order)
-            collide_with_walls(work, masses, model.room)
-            limit_strains(work, masses, model.chains)
-            _limit_moves(work, masses, timing.speed_limit * timing.h)
-            read_velocities(work, masses, model.room, timing.inverse_h, timing.rest_speed)
-            _finish(work, model, timing, model.second_order)
-        # 0 times infinity is no number: pins too are put where they belong after a failed solve
-        _aim_pins(x, targets, tile, work, masses.pins, timing)
-        _move_pins(x, targets, tile, work, masses.pins, x.dtype.type(0))
-        _store(x, v, tile, work)
+        for attempt in range(2):
+            _load(x, v, tile, work)
+            _aim_pins(x, targets, tile, work, masses.pins, timing)
+            find_pairs(work, masses, model.self_collision, found, timing.dt)
+            for substep in range(substeps):
+                remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
+                _predict(work, masses, timing, model.second_order)
+                _move_pins(x, targets, tile, work, masses.pins, remaining)
+                _project(work, model, found, timing, model.iterations, model.second_order)
+                _project_again(work, model, found, timing, model.second_order)
+                collide_with_walls(work, masses, model.room)
+                limit_strains(work, masses, model.chains)
+                if attempt > 0:
+                    limit_moves(work, masses, timing.speed_limit * timing.h)
+                read_velocities(work, masses, model.room, timing.inverse_h, timing.rest_speed)
+                _finish(work, model, timing, model.second_order)
+                if attempt > 0:
+                    limit_velocities(work, masses, timing.speed_limit)
+            if attempt == 0:
+                failed = is_too_fast(work, masses, timing.speed_limit)
+            else:
+                # 0 times infinity is no number: pins too are put where they belong
+                _aim_pins(x, targets, tile, work, masses.pins, timing)
+                _move_pins(x, targets, tile, work, masses.pins, x.dtype.type(0))
+            _store(x, v, tile, work, attempt)
+            if not failed:
+                break
 
 
 @kernel
@@ -82,13 +97,16 @@ def _load(x, v, tile, work):
 
 
 @kernel
-def _store(x, v, tile, work):
+def _store(x, v, tile, work, mark):
+    """Write the lanes back that bear a mark."""
+    marks = row(work, work.shape[0] - 2)
     for particle in range(x.shape[1]):
         at = row(work, particle)
         for lane in range(min(LANES, x.shape[0] - tile * LANES)):
-            for k in range(DIM):
-                x[tile * LANES + lane, particle, k] = at[POSITION + k * LANES + lane]
-                v[tile * LANES + lane, particle, k] = at[VELOCITY + k * LANES + lane]
+            if marks[TOO_FAST + lane] == mark:
+                for k in range(DIM):
+                    x[tile * LANES + lane, particle, k] = at[POSITION + k * LANES + lane]
+                    v[tile * LANES + lane, particle, k] = at[VELOCITY + k * LANES + lane]
 
 
 @kernel
@@ -158,57 +176,10 @@ def _project_again(work, model, found, timing, second_order):
     """Solve the substep in first order where the second-order solve has failed."""
     if second_order is None:
         return
-    if count_failures(work, model.chains, model.distances) > 0:
+    if has_failed(work, model.chains, model.distances):
         return_to_prediction(work, model.particles, timing.h)
         _project(work, model, found, timing, max(model.iterations, _AGAIN), None)
         take_up_kept(work, model.particles)
-
-
-@kernel
-def _limit_moves(work, masses, reach):
-    """Let no free particle move farther than `reach` in a substep.
-
-    A solve that fails (links that turn through half a circle within a substep, constraints that
-    contradict each other) may send a particle anywhere, even nowhere (NaN); that one stays.
-    """
-    for particle in range(masses.inverse_mass.shape[0]):
-        if masses.inverse_mass[particle] > 0:
-            at = row(work, particle)
-            for lane in range(LANES):
-                square = reach * 0
-                for k in range(DIM):
-                    move = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
-                    square += move * move
-                share = _share_within(square, reach)
-                for k in range(DIM):
-                    now, start = at[POSITION + k * LANES + lane], at[START + k * LANES + lane]
-                    limited = start + share * (now - start) if share > 0 else start
-                    at[POSITION + k * LANES + lane] = now if share == 1 else limited
-
-
-@kernel
-def _limit_velocities(work, masses, speed):
-    """Let no free particle be faster than `speed`; as `_limit_moves`, after velocities changed."""
-    for particle in range(masses.inverse_mass.shape[0]):
-        if masses.inverse_mass[particle] > 0:
-            at = row(work, particle)
-            for lane in range(LANES):
-                square = speed * 0
-                for k in range(DIM):
-                    square += at[VELOCITY + k * LANES + lane] * at[VELOCITY + k * LANES + lane]
-                share = _share_within(square, speed)
-                for k in range(DIM):
-                    now = at[VELOCITY + k * LANES + lane]
-                    at[VELOCITY + k * LANES + lane] = share * now if share > 0 else speed * 0
-
-
-@kernel
-def _share_within(square, longest):
-    """Return by how much to shorten a vector of a square length; 0 if it is not a number."""
-    real = type(longest)
-    if square <= longest * longest:
-        return real(1)
-    return longest / np.sqrt(square) if square < real(np.inf) else real(0)
 
 
 @kernel
@@ -228,4 +199,3 @@ def _finish(work, model, timing, second_order):
                     at[VELOCITY + lane] += kick
     project_distance_velocities(work, masses, model.distances)
     project_chain_velocities(work, masses, model.chains)
-    _limit_velocities(work, masses, timing.speed_limit)
