@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from pbd_gym.physics.building.bending import BendBuilder
 from pbd_gym.physics.building.contacts import ContactBuilder
-from pbd_gym.physics.building.links import LinkBuilder
+from pbd_gym.physics.building.tethers import TetherBuilder
 from pbd_gym.physics.model import Model
 
 INTEGRATORS = ("pbd", "rattle")
 
 
-class ModelBuilder(LinkBuilder, ContactBuilder):
+class ModelBuilder(TetherBuilder, BendBuilder, ContactBuilder):
     """Collects particles and what holds between them; `build` checks it all and returns a Model.
 
     Args:
@@ -48,7 +49,7 @@ class ModelBuilder(LinkBuilder, ContactBuilder):
             gravity[-1] = -9.81
         particles = self._particle_table(np.array(gravity, dtype=np.float64))
         _check_settings(damping, integrator, iterations)
-        chains = self._chain_table()
+        chains, ropes = self._chain_tables()
         return Model(
             dim=self.dim,
             damping=float(damping),
@@ -56,8 +57,13 @@ class ModelBuilder(LinkBuilder, ContactBuilder):
             iterations=int(iterations),
             particles=particles,
             chains=chains,
-            distances=self._distance_table(chains),
+            ropes=ropes,
+            distances=self._distance_table(chains, ropes),
+            limits=self._limit_table(),
             bends=self._bend_table(),
+            rods=self._rod_table(),
+            hinges=self._hinge_table(),
+            folds=self._fold_table(),
             room=self._room_table(),
             self_collision=self._self_collision_table(),
             bodies=tuple(self._bodies),

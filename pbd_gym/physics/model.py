@@ -10,7 +10,20 @@ from typing import Any
 import numpy as np
 
 from pbd_gym.physics.bodies import Body
-from pbd_gym.physics.tables import Bends, Chains, Distances, Particles, Room, SelfCollision
+from pbd_gym.physics.tables import (
+    Bends,
+    Chains,
+    Distances,
+    Folds,
+    Hinges,
+    Limits,
+    Particles,
+    Rods,
+    Room,
+    Ropes,
+    SelfCollision,
+    links_in_rows,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +37,13 @@ class Model:
         iterations: Projections of the rigid constraints in a substep.
         particles: Point masses, pins and gravity.
         chains: Links in a row, solved directly.
+        ropes: Chains that stay stable under any tension and may be slack, or None.
         distances: Distances kept by sweeps.
+        limits: Distances kept between bounds, or None.
         bends: Bends with a straight rest.
+        rods: Rows of particles whose bending is solved directly, or None.
+        hinges: Angles between triangles, or None.
+        folds: Pairs of triangles that are flat at rest, or None.
         room: Walls.
         self_collision: Particles that keep their distance, or None.
         bodies: What a renderer draws.
@@ -38,8 +56,13 @@ class Model:
     iterations: int
     particles: Particles
     chains: Chains
+    ropes: Ropes | None
     distances: Distances
+    limits: Limits | None
     bends: Bends
+    rods: Rods | None
+    hinges: Hinges | None
+    folds: Folds | None
     room: Room
     self_collision: SelfCollision | None
     bodies: tuple[Body, ...]
@@ -105,4 +128,8 @@ class Model:
 
     def links(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the links of all chains: their particles (links, 2) and rest lengths [m]."""
-        return self.chains.links()
+        pairs, rest = links_in_rows(self.chains)
+        if self.ropes is None:
+            return pairs, rest
+        of_ropes, rest_of_ropes = links_in_rows(self.ropes)
+        return np.concatenate([pairs, of_ropes]), np.concatenate([rest, rest_of_ropes])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,13 @@ def rope(
     mass: float,
     compliance: float = 0.0,
     bending_stiffness: float = 0.0,
+    curvature: float = 0.0,
+    payload: float = 0.0,
+    slack: bool = False,
+    implicit: bool = False,
     radius: float = 0.01,
 ) -> np.ndarray:
-    """Add a straight rope whose links are solved directly; nothing is pinned.
+    """Add a straight rope whose links and bending are solved directly; nothing is pinned.
 
     Args:
         builder: Takes the rope.
@@ -31,6 +36,10 @@ def rope(
         mass: Of the whole rope [kg].
         compliance: Of a link [m/N]; l/(EA) for links of length l and an axial stiffness EA [N].
         bending_stiffness: EI [N m2]; 0 bends freely.
+        curvature: Towards which the bending draws it, 1/radius [1/m]; see `add_rod`.
+        payload: Mass that its last particle carries besides [kg].
+        slack: Let links be shorter than their rest: they pull but do not push.
+        implicit: Stay stable with many short links and heavy masses; see `add_chain`.
         radius: Drawn [m].
 
     Returns:
@@ -43,12 +52,52 @@ def rope(
         raise ValueError(f"particles is {particles}; a rope has at least 2")
     share = np.linspace(0.0, 1.0, particles)[:, None]
     first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    indices = builder.add_particles(first + share * (last - first), mass / particles)
-    builder.add_chain(indices, compliance=compliance)
+    masses = np.full(particles, mass / particles)
+    masses[-1] += payload
+    indices = chain(
+        builder,
+        first + share * (last - first),
+        masses,
+        compliance=compliance,
+        slack=slack,
+        implicit=implicit,
+        radius=radius,
+    )
     if bending_stiffness > 0.0:
-        link = float(np.sqrt(np.sum((last - first) ** 2))) / (particles - 1)
-        for a, b, c in zip(indices, indices[1:], indices[2:], strict=False):
-            builder.add_bend(a, b, c, compliance=link**3 / bending_stiffness)
+        builder.add_rod(indices, bending_stiffness=bending_stiffness, curvature=curvature)
+    return indices
+
+
+def chain(
+    builder: ModelBuilder,
+    points: Any,
+    masses: Any,
+    *,
+    compliance: float = 0.0,
+    slack: bool = False,
+    implicit: bool = False,
+    radius: float = 0.01,
+) -> np.ndarray:
+    """Add a chain through points, with a mass at each; nothing is pinned.
+
+    Args:
+        builder: Takes the chain.
+        points: (n, dim) [m], at least 2.
+        masses: Of the particles [kg], one or one each.
+        compliance: Of a link [m/N].
+        slack: Let links be shorter than their rest: they pull but do not push.
+        implicit: Stay stable with many short links and heavy masses; see `add_chain`.
+        radius: Drawn [m].
+
+    Returns:
+        The particles' indices, in the order of the points.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    shares = np.broadcast_to(np.asarray(masses, dtype=np.float64), (len(points),))
+    indices = np.concatenate(
+        [builder.add_particles(at, mass) for at, mass in zip(points, shares, strict=True)]
+    )
+    builder.add_chain(indices, compliance=compliance, slack=slack, implicit=implicit)
     builder.add_body(Strand(tuple(map(int, indices)), radius))
     return indices
 
@@ -103,9 +152,10 @@ def cloth(
     bending_friction: float = 0.0,
     collision_distance: float = 0.0,
     collision_friction: float = 0.0,
+    pinned: Iterable[tuple[int, int]] = (),
     radius: float = 0.002,
 ) -> np.ndarray:
-    """Add a flat rectangular cloth woven of threads; nothing is pinned.
+    """Add a flat rectangular cloth woven of threads.
 
     Each row and each column is a thread, solved directly as a chain. Shear (both diagonals of each
     cell) and bending (along the threads) are soft.
@@ -124,6 +174,7 @@ def cloth(
         bending_friction: Force up to which dry friction holds each bend as it is [N].
         collision_distance: That the particles keep from each other [m]; 0 for none.
         collision_friction: Coulomb coefficient between particles.
+        pinned: (row, column) of the particles that are held; negative ones count from the end.
         radius: Half the drawn thickness [m].
 
     Returns:
@@ -140,6 +191,7 @@ def cloth(
     points = np.asarray(corner, dtype=np.float64) + down + across
     indices = builder.add_particles(points.reshape(-1, 3), mass / (rows * columns))
     grid = indices.reshape(rows, columns)
+    builder.pin([grid[place] for place in pinned])
     _shear(builder, grid, shear_compliance)
     for thread in (*grid, *grid.T):
         for a, b, c in zip(thread, thread[1:], thread[2:], strict=False):
@@ -160,3 +212,30 @@ def _shear(builder: ModelBuilder, grid: np.ndarray, compliance: float) -> None:
     for a, b in ((grid[:-1, :-1], grid[1:, 1:]), (grid[:-1, 1:], grid[1:, :-1])):
         for i, j in zip(a.ravel(), b.ravel(), strict=True):
             builder.add_distance(int(i), int(j), compliance=compliance)
+
+
+def bend_sheet(
+    builder: ModelBuilder, triangles: Any, *, bending_stiffness: float, creased: bool = False
+) -> None:
+    """Let the triangles of a sheet resist bending across every edge that two of them share.
+
+    Args:
+        builder: Has the sheet's particles, and takes its bending.
+        triangles: (t, 3) particles, all wound the same way.
+        bending_stiffness: B of the sheet [N m].
+        creased: Take the angles as placed for the rest (hinges); else flat (folds).
+
+    Raises:
+        ValueError: If an edge has more than two triangles, or two that are wound differently.
+    """
+    wings: dict[tuple[int, int], int] = {}
+    for a, b, c in np.asarray(triangles).tolist():
+        for start, end, wing in ((a, b, c), (b, c, a), (c, a, b)):
+            if (start, end) in wings:
+                raise ValueError(f"two triangles run along their edge from {start} to {end}")
+            wings[start, end] = wing
+    add = builder.add_hinge if creased else builder.add_fold
+    for (start, end), wing in wings.items():
+        if start < end and (end, start) in wings:
+            pair = (wing, wings[end, start])
+            add((start, end), pair, bending_stiffness=bending_stiffness)

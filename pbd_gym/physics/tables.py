@@ -47,13 +47,23 @@ class Chains(NamedTuple):
     compliance: Any
     greatest: Any
 
-    def links(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the links: their particles (links, 2) and rest lengths [m]."""
-        last = np.zeros(len(self.particles), dtype=bool)
-        last[self.offsets[1:] - 1] = True
-        entries = np.flatnonzero(~last)
-        pairs = np.stack([self.particles[entries], self.particles[entries + 1]], axis=1)
-        return pairs, self.rest[entries]
+
+class Ropes(NamedTuple):
+    """Links in a row that stay stable under any tension; R ropes with L entries.
+
+    Attributes:
+        offsets: (R + 1,) first entry of each rope.
+        particles: (L,) particle of each entry.
+        rest: (L,) rest length of the link that starts at an entry [m]; a rope's last is unused.
+        compliance: (L,) of a stretched link [m/N].
+        slack: (R,) 1 where links may be shorter than their rest.
+    """
+
+    offsets: Any
+    particles: Any
+    rest: Any
+    compliance: Any
+    slack: Any
 
 
 class Distances(NamedTuple):
@@ -72,6 +82,22 @@ class Distances(NamedTuple):
     stiffness: Any
 
 
+class Limits(NamedTuple):
+    """Distances kept between bounds: slack ropes, tethers, strain limits.
+
+    Attributes:
+        pairs: (E, 2) particles.
+        least: (E,) length below which they are pushed apart [m]; 0 for never.
+        greatest: (E,) length beyond which they are pulled together [m]; +inf for never.
+        compliance: (E,) [m/N].
+    """
+
+    pairs: Any
+    least: Any
+    greatest: Any
+    compliance: Any
+
+
 class Bends(NamedTuple):
     """Straight rest of three particles in a row.
 
@@ -84,6 +110,53 @@ class Bends(NamedTuple):
     triples: Any
     compliance: Any
     friction: Any
+
+
+class Rods(NamedTuple):
+    """Bending of evenly spaced particles in a row, solved directly; R rods with L entries.
+
+    Attributes:
+        offsets: (R + 1,) first entry of each rod.
+        particles: (L,) particle of each entry.
+        rest: (L,) size of x_a - 2 x_b + x_c at rest, b at the entry [m]; in 2D positive where the
+            rod turns left. A rod's first and last are unused.
+        compliance: (L,) of that vector [m/N].
+    """
+
+    offsets: Any
+    particles: Any
+    rest: Any
+    compliance: Any
+
+
+class Hinges(NamedTuple):
+    """Angles between two triangles that share an edge.
+
+    Attributes:
+        corners: (H, 4) the edge's two particles, then the triangles' other corners.
+        cosine: (H,) of half the rest angle.
+        sine: (H,) of half the rest angle.
+        compliance: (H,) [rad/(N m)].
+    """
+
+    corners: Any
+    cosine: Any
+    sine: Any
+    compliance: Any
+
+
+class Folds(NamedTuple):
+    """Flat rest of two triangles that share an edge, as a sum of their corners.
+
+    Attributes:
+        corners: (F, 4) the edge's two particles, then the triangles' other corners.
+        weights: (F, 4) of the corners in that sum.
+        compliance: (F,) [m2/(N m)].
+    """
+
+    corners: Any
+    weights: Any
+    compliance: Any
 
 
 class Room(NamedTuple):
@@ -128,8 +201,13 @@ class Parameters(NamedTuple):
 
     particles: Particles
     chains: Chains
+    ropes: Ropes | None
     distances: Distances
+    limits: Limits | None
     bends: Bends
+    rods: Rods | None
+    hinges: Hinges | None
+    folds: Folds | None
     room: Room
     self_collision: SelfCollision | None
     second_order: bool | None
@@ -158,6 +236,15 @@ class Timing(NamedTuple):
     rest_speed: Any
     gravity: Any
     speed_limit: Any
+
+
+def links_in_rows(table: Chains | Ropes) -> tuple[np.ndarray, np.ndarray]:
+    """Return the links of chains or ropes: their particles (links, 2) and rest lengths [m]."""
+    last = np.zeros(len(table.particles), dtype=bool)
+    last[table.offsets[1:] - 1] = True
+    entries = np.flatnonzero(~last)
+    pairs = np.stack([table.particles[entries], table.particles[entries + 1]], axis=1)
+    return pairs, table.rest[entries]
 
 
 def as_read(table: Any, dtype: np.dtype) -> Any:

@@ -223,8 +223,9 @@ class World:
             f"{self.lanes} lanes",
             self.dtype.name,
         ]
-        if self.model.self_collision is not None:
-            variant.append("self-collision")
+        kinds = ("self_collision", "ropes", "limits", "rods", "hinges", "folds")
+        present = [kind for kind in kinds if getattr(self.model, kind) is not None]
+        variant += [kind.replace("_", "-") for kind in present]
         done = compiling.announce_compilation(", ".join(variant))
         none = np.zeros(2, dtype=np.int64)
         targets = np.ascontiguousarray(self.x[:, self.model.pins])
@@ -261,8 +262,13 @@ def _parameters(model: Model) -> Parameters:
     return Parameters(
         particles=model.particles,
         chains=model.chains,
+        ropes=model.ropes,
         distances=model.distances,
+        limits=model.limits,
         bends=model.bends,
+        rods=model.rods,
+        hinges=model.hinges,
+        folds=model.folds,
         room=model.room,
         self_collision=model.self_collision,
         second_order=True if model.integrator == "rattle" else None,

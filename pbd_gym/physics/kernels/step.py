@@ -17,7 +17,11 @@ from .fallback import (
     return_to_prediction,
     take_up_kept,
 )
+from .fold import project_folds, project_hinges
 from .layout import DIM, LANES, POSITION, START, TOO_FAST, VELOCITY, WIDTH
+from .limit import project_limits
+from .rod import project_rods
+from .rope import finish_ropes, project_ropes
 from .sweep import (
     project_bends,
     project_distance_velocities,
@@ -162,13 +166,21 @@ def _project(work, model, found, timing, iterations, second_order):
     for iteration in range(iterations):
         if iteration == 0:
             project_bends(work, masses, model.bends, inverse_h2)
+            project_hinges(work, masses, model.hinges, inverse_h2)
+            project_folds(work, masses, model.folds, inverse_h2)
+            project_rods(work, masses, model.rods, inverse_h2)
             collide_with_self(work, masses, model.self_collision, found, timing.h, timing.gravity)
         if second_order is not None:
             project_distances_from_start(work, masses, model.distances, inverse_h2, iteration)
-            project_chains_from_start(work, masses, model.chains, inverse_h2, iteration)
         else:
             project_distances(work, masses, model.distances, inverse_h2, iteration)
+        project_limits(work, masses, model.limits, inverse_h2, iteration)
+        if second_order is not None:
+            project_chains_from_start(work, masses, model.chains, inverse_h2, iteration)
+        else:
             project_chains(work, masses, model.chains, inverse_h2, iteration)
+        project_ropes(work, masses, model.ropes, inverse_h2, iteration)
+    finish_ropes(work, masses, model.ropes, inverse_h2)
 
 
 @kernel
