@@ -121,12 +121,14 @@ class Rods(NamedTuple):
         rest: (L,) size of x_a - 2 x_b + x_c at rest, b at the entry [m]; in 2D positive where the
             rod turns left. A rod's first and last are unused.
         compliance: (L,) of that vector [m/N].
+        curved: (R,) 1 where the rest is not straight.
     """
 
     offsets: Any
     particles: Any
     rest: Any
     compliance: Any
+    curved: Any
 
 
 class Hinges(NamedTuple):

@@ -175,6 +175,7 @@ class BendBuilder(ParticleBuilder):
             particles=joined([rod.particles for rod in self._rods], np.int64),
             rest=joined(rest, np.float64),
             compliance=joined(compliance, np.float64),
+            curved=np.array([bool(np.any(turns)) for turns in rest], dtype=np.int64),
         )
 
     def _check_rods(self) -> None:
