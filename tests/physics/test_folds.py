@@ -15,7 +15,7 @@ def wings(*, angle=0.0, free=(0, 1, 2, 3), mass=0.01, **settings):
     builder = ModelBuilder(3)
     corners = np.array([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0, -0.1, 0)], dtype=float)
     hinge = builder.add_particles(corners, mass)
-    fold = builder.add_particles(corners + [1.0, 0.0, 0.0], mass)
+    fold = builder.add_particles(corners + np.array([1.0, 0.0, 0.0]), mass)
     builder.add_hinge(hinge[:2], hinge[2:], bending_stiffness=STIFFNESS, angle=angle)
     builder.add_fold(fold[:2], fold[2:], bending_stiffness=STIFFNESS)
     for corner in set(range(4)) - set(free):
@@ -69,7 +69,9 @@ def test_wings_sag_until_the_torque_balances_their_weight():
     # a hinge has k 2 sin(phi/2) = m g r cos(phi); k = B edge^2 / area of both triangles
     k = STIFFNESS * 0.1**2 / 0.01
     phi = bend(state.x[0, :4])
-    assert k * 2.0 * np.sin(phi / 2.0) == pytest.approx(mass * GRAVITY * 0.1 * np.cos(phi), **tolerance)
+    assert k * 2.0 * np.sin(phi / 2.0) == pytest.approx(
+        mass * GRAVITY * 0.1 * np.cos(phi), **tolerance
+    )
     # a fold's energy is k/2 |u + v|^2 for unit vectors along the wings, k (1 - cos(phi))
     phi = bend(state.x[0, 4:])
     assert k * np.sin(phi) == pytest.approx(mass * GRAVITY * 0.1 * np.cos(phi), **tolerance)
