@@ -12,7 +12,7 @@ import pytest
 from scenes import cloth_3d, pendulum_2d, rope_2d
 
 import pbd_gym
-from pbd_gym.physics import World
+from pbd_gym.physics import ModelBuilder, World, shapes
 
 WORLDS = 35  # a tile of 32 lanes and a remainder of 3, or four tiles of 8 and a remainder of 3
 STEPS = 6
@@ -24,9 +24,40 @@ MODELS = {
 }
 
 
+def lines():
+    """A slack rope on tethers and a curved strip with a heavy end."""
+    builder = ModelBuilder(2)
+    strip = {"bending_stiffness": 1e-3, "curvature": 2.0, "payload": 0.5, "implicit": True}
+    slack = shapes.rope(builder, (0.0, 0.0), (0.0, -1.0), 12, mass=0.2, slack=True)
+    stiff = shapes.rope(builder, (0.5, 0.0), (0.5, -1.0), 12, mass=0.2, **strip)
+    builder.add_rod(slack, bending_stiffness=1e-3)
+    builder.pin([slack[0], stiff[0]])
+    builder.add_tethers(stretch=0.01)
+    return builder.build(iterations=2)
+
+
+def creased():
+    """Two sheets of three triangles that hang from a corner: one creased at rest, one flat."""
+    builder = ModelBuilder(3)
+    corners = np.array([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0.02), (0, -0.1, 0), (0.1, 0.1, 0)])
+    triangles = np.array([(0, 1, 2), (1, 0, 3), (1, 4, 2)])
+    for is_creased in (True, False):
+        indices = builder.add_particles(corners, 0.01)
+        builder.pin(indices[0])
+        sheet = indices[triangles]
+        shapes.bend_sheet(builder, sheet, bending_stiffness=1e-3, creased=is_creased)
+        for i, j in ((0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (1, 4), (2, 4)):
+            builder.add_distance(indices[i], indices[j])
+    return builder.build(iterations=2)
+
+
+# constraints of which lanes alone are compared, as every other number of lanes is compiled anew
+FURTHER = {"lines": lines, "creased": creased}
+
+
 def run(name, num_worlds, *, dtype=np.float32, **keywords):
     """Positions and velocities after a few steps in which every world has motions of its own."""
-    model = MODELS[name]()
+    model = {**MODELS, **FURTHER}[name]()
     state = World(model, num_worlds, dtype=dtype, **keywords)
     random = np.random.default_rng(7)
     state.v[:] = random.normal(scale=0.5, size=(WORLDS, *state.v.shape[1:]))[:num_worlds]
@@ -50,6 +81,12 @@ def one_by_one(name, dtype):
 def test_lanes_and_threads_do_not_change_a_bit(name, lanes, dtype, num_threads):
     several = run(name, WORLDS, dtype=dtype, lanes=lanes, num_threads=num_threads)
     np.testing.assert_array_equal(several, one_by_one(name, dtype))
+
+
+@pytest.mark.parametrize("name", FURTHER)
+def test_lanes_do_not_change_a_bit_of_further_constraints(name):
+    several = run(name, WORLDS, dtype=np.float64, lanes=8)
+    np.testing.assert_array_equal(several, one_by_one(name, np.float64))
 
 
 @pytest.mark.parametrize("name", MODELS)
