@@ -37,7 +37,8 @@ class ModelBuilder(TetherBuilder, BendBuilder, ContactBuilder):
             integrator: "pbd": positions are projected along the current constraint direction and
                 velocities read off (first order, dissipates like backward Euler). "rattle": chains
                 and distances are projected along the direction at the start of the substep, then
-                velocities too (second order, keeps energy); for pendulums and short chains.
+                velocities too (second order, keeps energy); for pendulums and short chains. All
+                else, implicit and slack chains among it, is projected as with "pbd".
             iterations: Projections of rigid constraints in a substep. A compliant constraint
                 receives its force in the first and keeps it.
 
