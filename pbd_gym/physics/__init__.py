@@ -7,6 +7,20 @@ from pbd_gym.physics import shapes
 from pbd_gym.physics.bodies import Linkage, Sheet, Strand
 from pbd_gym.physics.builder import ModelBuilder
 from pbd_gym.physics.model import Model
-from pbd_gym.physics.world import Snapshot, World
+from pbd_gym.physics.snapshot import Snapshot
+from pbd_gym.physics.tables import Forces
+from pbd_gym.physics.timestep import Adaptive
+from pbd_gym.physics.world import World
 
-__all__ = ["Linkage", "Model", "ModelBuilder", "Sheet", "Snapshot", "Strand", "World", "shapes"]
+__all__ = [
+    "Adaptive",
+    "Forces",
+    "Linkage",
+    "Model",
+    "ModelBuilder",
+    "Sheet",
+    "Snapshot",
+    "Strand",
+    "World",
+    "shapes",
+]

@@ -130,6 +130,17 @@ def _load_kernels(dim: int, lanes: int) -> ModuleType:
     return importlib.import_module(f"{name}.step")
 
 
+def compiled_for(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+    """Return the machine code of a kernel that was called with arguments of these types before.
+
+    Called through numba's dispatcher, the types of all arrays of a model are found out again in
+    every call, which takes as long as a step of a small model. The machine code trusts its caller.
+    """
+    if _SETTINGS.DISABLE_JIT:
+        return function
+    return function.get_overload(tuple(map(function.typeof_pyval, arguments)))
+
+
 def loaded_lanes(dim: int) -> int | None:
     """Return the lanes of kernels that are loaded already, None if there are none.
 

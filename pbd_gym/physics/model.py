@@ -117,6 +117,12 @@ class Model:
         return self.particles.pins
 
     @property
+    def grabbable(self) -> np.ndarray:
+        """Particles that a World can grab and release, (G,), in the order of `World.grabbed`."""
+        grabbable = self.particles.grabbable
+        return np.zeros(0, dtype=np.int64) if grabbable is None else grabbable
+
+    @property
     def gravity(self) -> np.ndarray:
         """(dim,) [m/s2]."""
         return self.particles.gravity

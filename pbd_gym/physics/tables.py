@@ -222,7 +222,6 @@ class Timing(NamedTuple):
     Attributes:
         dt: Control step [s].
         h: Substep [s].
-        inverse_h: 1/h [1/s].
         inverse_h2: 1/h^2 [1/s2].
         decay: exp(-damping h).
         rest_speed: Speed below which impacts do not bounce [m/s].
@@ -232,7 +231,6 @@ class Timing(NamedTuple):
 
     dt: Any
     h: Any
-    inverse_h: Any
     inverse_h2: Any
     decay: Any
     rest_speed: Any
@@ -240,11 +238,32 @@ class Timing(NamedTuple):
     speed_limit: Any
 
 
-def links_in_rows(table: Chains | Ropes) -> tuple[np.ndarray, np.ndarray]:
-    """Return the links of chains or ropes: their particles (links, 2) and rest lengths [m]."""
+class Forces(NamedTuple):
+    """Forces [N] of the last substep of a control step, one row per world.
+
+    Attributes:
+        chains: (W, links) of the chains, the first of `Model.links`; positive where a link pulls.
+        distances: (W, E); positive where a distance pulls.
+        bends: (W, B) size of the force on each outer particle; the middle one feels twice that.
+        walls: (W, N, dim) of the walls on each particle, friction included.
+    """
+
+    chains: Any
+    distances: Any
+    bends: Any
+    walls: Any
+
+
+def entries_of_links(table: Chains | Ropes) -> np.ndarray:
+    """Return the entries of chains or ropes at which a link starts, (links,)."""
     last = np.zeros(len(table.particles), dtype=bool)
     last[table.offsets[1:] - 1] = True
-    entries = np.flatnonzero(~last)
+    return np.flatnonzero(~last)
+
+
+def links_in_rows(table: Chains | Ropes) -> tuple[np.ndarray, np.ndarray]:
+    """Return the links of chains or ropes: their particles (links, 2) and rest lengths [m]."""
+    entries = entries_of_links(table)
     pairs = np.stack([table.particles[entries], table.particles[entries + 1]], axis=1)
     return pairs, table.rest[entries]
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import io
-import os
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics import compiling, portable
+from pbd_gym.physics import compiling
 from pbd_gym.physics.model import Model
-from pbd_gym.physics.tables import Parameters, Timing, as_read
+from pbd_gym.physics.recording import copy_of_forces, recorded_forces, scratch_of_forces
+from pbd_gym.physics.snapshot import Snapshot
+from pbd_gym.physics.tables import Forces, Parameters, as_read
+from pbd_gym.physics.targets import check_targets
+from pbd_gym.physics.threads import cores, pool
+from pbd_gym.physics.timestep import Adaptive, count_substeps, is_whole, timing_of
 
 # One world runs in scalar code. Below this number of worlds a tile of lanes would be mostly empty.
 _FEWEST_FOR_LANES = 8
@@ -21,53 +22,6 @@ _BATCH_LANES = 32
 _FEWEST_PARTICLES_FOR_THREADS = 4096
 # Candidate pairs of self-collision that a world can hold, per particle.
 _PAIRS_PER_PARTICLE = 24
-# No particle is ever faster; what a failed solve throws about comes back [m/s].
-_SPEED_LIMIT = 1000.0
-# Beyond these h or 1/h^2 would leave the range of float32.
-_SHORTEST_SUBSTEP = 1e-9
-_LONGEST_STEP = 1e3
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """The state of n worlds as plain arrays, with the fingerprint of their model.
-
-    Attributes:
-        fingerprint: `Model.fingerprint`.
-        x: Positions (W, N, dim) [m].
-        v: Velocities (W, N, dim) [m/s].
-    """
-
-    fingerprint: str
-    x: np.ndarray
-    v: np.ndarray
-
-    def to_bytes(self) -> bytes:
-        """Return the snapshot as an uncompressed npz archive."""
-        buffer = io.BytesIO()
-        np.savez(buffer, fingerprint=np.array(self.fingerprint), x=self.x, v=self.v)
-        return buffer.getvalue()
-
-    @staticmethod
-    def from_bytes(data: bytes) -> Snapshot:
-        """Read what `to_bytes` wrote. Nothing is unpickled, so bytes of unknown origin do no harm.
-
-        Raises:
-            ValueError: If the bytes are not a snapshot.
-        """
-        try:
-            with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-                parts = {name: archive[name] for name in ("fingerprint", "x", "v")}
-        except Exception as error:  # zipfile, numpy and zlib raise a dozen kinds
-            raise ValueError(f"these {len(data)} bytes are not a snapshot: {error}") from error
-        x, v, fingerprint = parts["x"], parts["v"], parts["fingerprint"]
-        if fingerprint.dtype.kind != "U" or fingerprint.ndim != 0:
-            raise ValueError("these bytes are not a snapshot: the fingerprint is not a string")
-        if x.dtype not in (np.float32, np.float64) or x.dtype != v.dtype:
-            raise ValueError(f"these bytes are not a snapshot: types {x.dtype} and {v.dtype}")
-        if x.ndim != 3 or x.shape != v.shape:
-            raise ValueError(f"these bytes are not a snapshot: shapes {x.shape} and {v.shape}")
-        return Snapshot(str(fingerprint), x, v)
 
 
 class World:
@@ -83,8 +37,7 @@ class World:
             result does not depend on it.
 
     Attributes:
-        x: Positions (W, N, dim) [m]; may be written between steps.
-        v: Velocities (W, N, dim) [m/s]; a pin's is that of its last move.
+        forces: `Forces` of the last step if it was recorded, else None.
 
     Raises:
         ValueError: If an argument is out of range.
@@ -103,7 +56,7 @@ class World:
         for name, value in counts.items():
             if value is None and name != "num_worlds":
                 continue
-            if not _is_whole(value) or value < 1:
+            if not is_whole(value) or value < 1:
                 raise ValueError(f"{name} is {value!r}; expected a whole number from 1 up")
         self.dtype = np.dtype(dtype)
         if self.dtype not in (np.float32, np.float64):
@@ -114,26 +67,27 @@ class World:
         tiles = -(-self.num_worlds // self.lanes)
         if num_threads is None:
             worth_it = self.num_worlds * model.num_particles >= _FEWEST_PARTICLES_FOR_THREADS
-            num_threads = _cores() if worth_it else 1
+            num_threads = cores() if worth_it else 1
         self.num_threads = min(int(num_threads), tiles)
         shape = (self.num_worlds, model.num_particles, model.dim)
-        self.x = np.empty(shape, dtype=self.dtype)
-        self.x[:] = model.positions
-        self.v = np.zeros(shape, dtype=self.dtype)
+        self._x = np.empty(shape, dtype=self.dtype)
+        self._x[:] = model.positions
+        self._v = np.zeros(shape, dtype=self.dtype)
+        self._grabbed = np.zeros((self.num_worlds, len(model.grabbable)), dtype=bool)
         self._prepare()
 
     def _prepare(self) -> None:
         """Load the kernels and allocate their scratch, one set per thread."""
-        self._kernels = compiling.load_kernels(self.model.dim, self.lanes)
-        self._parameters = as_read(_parameters(self.model), self.dtype)
-        tiles = -(-self.num_worlds // self.lanes)
-        bounds = np.linspace(0, tiles, self.num_threads + 1).astype(np.int64)
-        self._shares = [
-            (bounds[i : i + 2].copy(), *self._scratch()) for i in range(self.num_threads)
-        ]
-        self._timing_key: tuple[float, int] | None = None
+        model = self.model
+        self._kernels = compiling.load_kernels(model.dim, self.lanes)
+        self._parameters = as_read(_parameters(model), self.dtype)
+        self._driven = np.concatenate([model.pins, model.grabbable])
+        self._scratch = [self._allocate() for _ in range(self.num_threads)]
+        self._substeps_used = np.zeros(self.num_worlds, dtype=np.int64)
+        self._settings: tuple[Any, ...] = ()
+        self.forces: Forces | None = None
 
-    def _scratch(self) -> tuple[Any, ...]:
+    def _allocate(self) -> tuple[Any, ...]:
         """Return the scratch of one thread: work, and that of self-collision or None."""
         shape = (self.model.num_particles + 2, self._kernels.WIDTH)
         work = np.zeros(shape, dtype=self.dtype)
@@ -144,97 +98,176 @@ class World:
         return work, (pairs, np.zeros(self.lanes, dtype=np.int64))
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = ("model", "num_worlds", "dtype", "num_threads", "lanes", "x", "v")
+        kept = ("model", "num_worlds", "dtype", "num_threads", "lanes", "_x", "_v", "_grabbed")
         return {name: self.__dict__[name] for name in kept}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._prepare()
 
-    def step(self, dt: float, substeps: int = 10, targets: np.ndarray | None = None) -> None:
+    # The kernels are called without a look at their arguments' types: the arrays stay the same.
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions (W, N, dim) [m]; may be written between steps."""
+        return self._x
+
+    @x.setter
+    def x(self, positions: Any) -> None:
+        self._x[:] = positions
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities (W, N, dim) [m/s]; a pin's is that of its last move. May be written."""
+        return self._v
+
+    @v.setter
+    def v(self, velocities: Any) -> None:
+        self._v[:] = velocities
+
+    @property
+    def grabbed(self) -> np.ndarray:
+        """Which particles of `model.grabbable` are pins now, (W, G) bool; to be written."""
+        return self._grabbed
+
+    @grabbed.setter
+    def grabbed(self, grabbed: Any) -> None:
+        self._grabbed[:] = grabbed
+
+    @property
+    def substeps_used(self) -> np.ndarray:
+        """Substeps of each world in the last step, (W,)."""
+        return self._substeps_used.copy()
+
+    def step(
+        self,
+        dt: float,
+        substeps: int | Adaptive = 10,
+        targets: np.ndarray | None = None,
+        *,
+        record: bool = False,
+    ) -> None:
         """Advance every world by one control step.
 
         Args:
             dt: Length of the step [s].
-            substeps: Parts into which it is divided.
-            targets: Where the pins are at the end of the step, (W, P, dim) [m]; they move there in
-                a straight line at constant speed. Where they are now if None.
+            substeps: Parts into which it is divided; `Adaptive` to let each world's fastest
+                particle decide.
+            targets: Where pins and grabbed particles are at the end of the step, those of the P
+                pins before those of the G grabbable particles, (W, P + G, dim) [m]; they move there
+                in a straight line at constant speed. Targets of particles that are not grabbed are
+                not read and may be NaN. Where they are now if None.
+            record: Whether to leave the forces of the last substep in `forces`.
 
         Raises:
             ValueError: If dt or substeps are not positive, or the targets' shape is wrong or one
                 of them is not finite. Nothing has moved then.
         """
-        if (dt, substeps) != self._timing_key:
-            self._set_timing(dt, substeps)
-        pins = self.model.pins
+        if (dt, substeps, record) != self._settings:
+            self._set(dt, substeps, record)
         if targets is None:
-            targets = np.ascontiguousarray(self.x[:, pins])
+            targets = np.ascontiguousarray(self._x[:, self._driven])
         else:
             targets = np.ascontiguousarray(targets, dtype=self.dtype)
-            expected = (self.num_worlds, len(pins), self.model.dim)
+            expected = (self.num_worlds, len(self._driven), self.model.dim)
             if targets.shape != expected:
                 raise ValueError(f"targets have shape {targets.shape}; expected {expected}")
-            if not np.isfinite(targets).all():
-                world, pin = np.argwhere(~np.isfinite(targets))[0, :2]
-                raise ValueError(f"target of pin {pin} in world {world} is {targets[world, pin]}")
+            check_targets(targets, self.model.pins, self._grabbed)
+        if isinstance(substeps, Adaptive):
+            self._advance_in_groups(dt, substeps, targets)
+        else:
+            self._advance(targets, self._shares, substeps)
+        self.forces = copy_of_forces(self.model, self._recorded) if record else None
+
+    def _advance(self, targets: np.ndarray, shares: list[tuple[Any, ...]], substeps: int) -> None:
+        """Advance the worlds of each share on a thread of its own."""
+        timing = self._timings[substeps]
         waiting = [
-            _pool(self.num_threads - 1).submit(self._advance, targets, share)
-            for share in self._shares[1:]
+            pool(self.num_threads - 1).submit(
+                self._compiled, self._x, self._v, targets, *share, timing, substeps
+            )
+            for share in shares[1:]
         ]
-        self._advance(targets, self._shares[0])
+        self._compiled(self._x, self._v, targets, *shares[0], timing, substeps)
         for future in waiting:
             future.result()
 
-    def _advance(self, targets: np.ndarray, share: tuple[Any, ...]) -> None:
-        self._kernels.advance(
-            self.x,
-            self.v,
+    def _advance_in_groups(self, dt: float, substeps: Adaptive, targets: np.ndarray) -> None:
+        """Advance the worlds that take the same number of substeps together."""
+        model, used = self.model, self._substeps_used
+        limits = (float(substeps.reach), int(substeps.least), int(substeps.most))
+        gravity = float(np.sqrt(np.sum(model.gravity**2)))
+        pins, grabbable, free = model.pins, model.grabbable, np.flatnonzero(model.inverse_mass)
+        count_substeps(
+            self._x,
+            self._v,
             targets,
-            *share,
-            self._parameters,
-            self._timing,
-            self._substeps,
+            free,
+            pins,
+            grabbable,
+            self._grabbed,
+            dt,
+            gravity,
+            limits,
+            used,
         )
+        for count in np.unique(used):
+            worlds = np.flatnonzero(used == count)
+            self._advance(targets, self._share_out(worlds), int(count))
 
-    def _set_timing(self, dt: float, substeps: int) -> None:
-        """Check and prepare what depends on the time step; announce a compilation before it."""
-        if not _is_whole(substeps) or substeps < 1:
-            raise ValueError(f"substeps is {substeps!r}; expected a whole number from 1 up")
-        if not (dt / substeps >= _SHORTEST_SUBSTEP and dt <= _LONGEST_STEP):
-            raise ValueError(
-                f"dt is {dt} s in {substeps} substeps; allowed: at most {_LONGEST_STEP} s, and at "
-                f"least {_SHORTEST_SUBSTEP} s a substep"
-            )
-        h = dt / substeps
-        gravity = float(np.sqrt(np.sum(self.model.gravity**2)))
-        decay = float(portable.exp(-self.model.damping * h))
-        # impacts slower than what gravity gives within two substeps are resting contacts
-        timing = Timing(dt, h, 1.0 / h, 1.0 / h**2, decay, 2.0 * gravity * h, gravity, _SPEED_LIMIT)
-        self._timing = as_read(timing, self.dtype)
-        self._substeps = int(substeps)
-        self._warm_up()
-        self._timing_key = (dt, substeps)
-
-    def _warm_up(self) -> None:
-        """Compile on a world of its own, so that the first real step is like any other."""
-        variant = [
-            f"{self.model.dim}D",
-            self.model.integrator,
-            f"{self.lanes} lanes",
-            self.dtype.name,
+    def _share_out(self, worlds: np.ndarray | None) -> list[tuple[Any, ...]]:
+        """Return what each thread is given: tiles, scratch, and what all of them read."""
+        count = self.num_worlds if worlds is None else len(worlds)
+        tiles = -(-count // self.lanes)
+        bounds = np.linspace(0, tiles, self.num_threads + 1).astype(np.int64)
+        grabbed = self._grabbed if len(self.model.grabbable) else None
+        return [
+            (bounds[i : i + 2].copy(), worlds, *scratch, grabbed, forces, self._parameters)
+            for i, (scratch, forces) in enumerate(zip(self._scratch, self._noted, strict=True))
         ]
+
+    def _set(self, dt: float, substeps: int | Adaptive, record: bool) -> None:
+        """Check and prepare what depends on the kind of step."""
+        model, dtype = self.model, self.dtype
+        adaptive = isinstance(substeps, Adaptive)
+        counts = substeps.counts() if adaptive else [substeps]
+        timings = {count: timing_of(model, dt, count, dtype) for count in counts}
+        self._settings = ()
+        self._timings = timings
+        self._noted: list[Any] = [None] * self.num_threads
+        if record:
+            self._recorded = recorded_forces(model, self.num_worlds, dtype)
+            self._noted = [
+                (*(scratch_of_forces(model, self.lanes, dtype) for _ in range(2)), self._recorded)
+                for _ in range(self.num_threads)
+            ]
+        self._shares = self._share_out(np.zeros(1, dtype=np.int64) if adaptive else None)
+        self._substeps_used[:] = counts[0]
+        self._compile(counts[0], adaptive, record)
+        self._settings = (dt, substeps, record)
+
+    def _compile(self, substeps: int, adaptive: bool, record: bool) -> None:
+        """Compile on a world of its own, so that the first real step is like any other."""
+        model = self.model
         kinds = ("self_collision", "ropes", "limits", "rods", "hinges", "folds")
-        present = [kind for kind in kinds if getattr(self.model, kind) is not None]
+        present = [kind for kind in kinds if getattr(model, kind) is not None]
+        extras = {"grabs": len(model.grabbable) > 0, "adaptive": adaptive, "forces": record}
+        variant = [f"{model.dim}D", model.integrator, f"{self.lanes} lanes", self.dtype.name]
         variant += [kind.replace("_", "-") for kind in present]
+        variant += [name for name, wanted in extras.items() if wanted]
         done = compiling.announce_compilation(", ".join(variant))
-        none = np.zeros(2, dtype=np.int64)
-        targets = np.ascontiguousarray(self.x[:, self.model.pins])
-        self._advance(targets, (none, *self._shares[0][1:]))
+        no_tiles = np.zeros(2, dtype=np.int64)
+        targets = np.ascontiguousarray(self._x[:, self._driven])
+        share = (no_tiles, *self._shares[0][1:])
+        arguments = (self._x, self._v, targets, *share, self._timings[substeps], substeps)
+        self._kernels.advance(*arguments)
+        self._compiled = compiling.compiled_for(self._kernels.advance, arguments)
         done()
 
     def snapshot(self) -> Snapshot:
         """Return a copy of the state; `restore` continues from it to the last bit."""
-        return Snapshot(self.model.fingerprint, self.x.copy(), self.v.copy())
+        grabbed = self._grabbed.copy() if len(self.model.grabbable) else None
+        return Snapshot(self.model.fingerprint, self._x.copy(), self._v.copy(), grabbed)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot.
@@ -247,14 +280,18 @@ class World:
                 f"the snapshot is of model {snapshot.fingerprint[:12]}, "
                 f"this world of model {self.model.fingerprint[:12]}"
             )
-        for name, array in (("positions", snapshot.x), ("velocities", snapshot.v)):
-            if array.shape != self.x.shape or array.dtype != self.dtype:
+        parts: dict[str, tuple[np.ndarray, np.ndarray]]
+        parts = {"positions": (snapshot.x, self._x), "velocities": (snapshot.v, self._v)}
+        if snapshot.grabbed is not None or len(self.model.grabbable):
+            parts["grabbed particles"] = (np.asarray(snapshot.grabbed), self._grabbed)
+        for name, (array, own) in parts.items():
+            if array.shape != own.shape or array.dtype != own.dtype:
                 raise ValueError(
                     f"the snapshot's {name} are {array.dtype} {array.shape}; "
-                    f"this world's are {self.dtype} {self.x.shape}"
+                    f"this world's are {own.dtype} {own.shape}"
                 )
-        self.x[:] = snapshot.x
-        self.v[:] = snapshot.v
+        for array, own in parts.values():
+            own[:] = array
 
 
 def _parameters(model: Model) -> Parameters:
@@ -274,27 +311,3 @@ def _parameters(model: Model) -> Parameters:
         second_order=True if model.integrator == "rattle" else None,
         iterations=model.iterations,
     )
-
-
-def _is_whole(value: Any) -> TypeGuard[int]:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
-
-
-def _cores() -> int:
-    """Number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-_pools: dict[int, ThreadPoolExecutor] = {}
-if hasattr(os, "register_at_fork"):
-    # the threads of a pool do not live on in a forked child: it makes its own
-    os.register_at_fork(after_in_child=_pools.clear)
-
-
-def _pool(size: int) -> ThreadPoolExecutor:
-    """Return the pool of `size` threads that all worlds of this process share."""
-    if size not in _pools:
-        _pools[size] = ThreadPoolExecutor(size, thread_name_prefix="pbd_gym")
-    return _pools[size]

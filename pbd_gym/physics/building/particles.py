@@ -29,6 +29,7 @@ class ParticleBuilder:
         self._positions: list[np.ndarray] = []
         self._masses: list[float] = []
         self._pinned: list[bool] = []
+        self._grabbable: list[int] = []
         self._bodies: list[Body] = []
 
     def add_particles(self, positions: Any, mass: float, *, pinned: bool = False) -> np.ndarray:
@@ -64,6 +65,22 @@ class ParticleBuilder:
                 raise ValueError(f"cannot pin particle {particle}: there are {len(self._pinned)}")
             self._pinned[particle] = True
 
+    def make_grabbable(self, particles: int | Iterable[int]) -> None:
+        """Allow particles to be grabbed and released while time runs (`World.grabbed`).
+
+        A grabbed particle is a pin: it moves only by its target. Released, it keeps the pin's
+        velocity. Particles are grabbed and released in each world by itself.
+
+        Raises:
+            ValueError: If a particle does not exist or was made grabbable before.
+        """
+        for particle in as_indices(np.atleast_1d(np.asarray(particles))):
+            if not 0 <= particle < len(self._pinned):
+                raise ValueError(f"cannot grab particle {particle}: there are {len(self._pinned)}")
+            if particle in self._grabbable:
+                raise ValueError(f"particle {particle} is grabbable already")
+            self._grabbable.append(int(particle))
+
     def add_body(self, body: Body) -> None:
         """Tell a renderer what to draw."""
         self._bodies.append(body)
@@ -88,7 +105,14 @@ class ParticleBuilder:
         if gravity.shape != (self.dim,) or not np.isfinite(gravity).all():
             raise ValueError(f"gravity is {gravity}; expected {self.dim} finite numbers [m/s2]")
         inverse_mass = 1.0 / np.where(pinned, np.inf, masses)
-        return Particles(positions, inverse_mass, np.flatnonzero(pinned), None, gravity)
+        return Particles(
+            positions, inverse_mass, np.flatnonzero(pinned), self._grabbable_table(pinned), gravity
+        )
+
+    def _grabbable_table(self, pinned: np.ndarray) -> np.ndarray | None:
+        grabbable = np.array(self._grabbable, dtype=np.int64)
+        refuse_if(pinned[grabbable], "grabbable particle", grabbable, "it is pinned for good")
+        return grabbable if len(grabbable) else None
 
     def _length(self, i: int, j: int) -> float:
         """Distance of two particles as placed [m]; NaN where one does not exist (build refuses)."""

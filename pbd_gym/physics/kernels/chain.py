@@ -13,6 +13,7 @@ and the particles move by x_i -= w_i n_i s_i, x_(i+1) += w_(i+1) n_i s_i (Muelle
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import note_chain, note_limit
 from .layout import (
     COUPLING,
     DIM,
@@ -35,7 +36,7 @@ _FREE = 1e30
 
 
 @kernel
-def project_chains(work, masses, chains, inverse_h2, iteration):
+def project_chains(work, masses, chains, inverse_h2, iteration, forces):
     """Bring the links of every chain to their lengths, along their current directions."""
     offsets, particles = chains.offsets, chains.particles
     rest, compliance = chains.rest, chains.compliance
@@ -57,10 +58,11 @@ def project_chains(work, masses, chains, inverse_h2, iteration):
             )
             before = link
         _back_substitute(work, masses, particles, first, last, POSITION)
+        note_chain(forces, work, particles, first, last, work.dtype.type(1))
 
 
 @kernel
-def project_chains_from_start(work, masses, chains, inverse_h2, iteration):
+def project_chains_from_start(work, masses, chains, inverse_h2, iteration, forces):
     """Bring the links to their lengths along their directions at the substep's start (SHAKE)."""
     offsets, particles = chains.offsets, chains.particles
     rest, compliance = chains.rest, chains.compliance
@@ -82,10 +84,11 @@ def project_chains_from_start(work, masses, chains, inverse_h2, iteration):
             )
             before = link
         _back_substitute(work, masses, particles, first, last, POSITION)
+        note_chain(forces, work, particles, first, last, work.dtype.type(1))
 
 
 @kernel
-def project_chain_velocities(work, masses, chains):
+def project_chain_velocities(work, masses, chains, h, forces):
     """Remove the velocity along rigid links (the second half of RATTLE)."""
     offsets, particles = chains.offsets, chains.particles
     compliance = chains.compliance
@@ -108,6 +111,7 @@ def project_chain_velocities(work, masses, chains):
             )
             before = link
         _back_substitute(work, masses, particles, first, last, VELOCITY)
+        note_chain(forces, work, particles, first, last, h)
 
 
 @kernel
@@ -243,7 +247,7 @@ def _apply(a, b, after, mass_a, mass_b, quantity):
 
 
 @kernel
-def limit_strains(work, masses, chains):
+def limit_strains(work, masses, chains, forces):
     """Shorten links that are stretched beyond their limit, one after another.
 
     Threads that cross are solved in turn, so the last ones leave an error in the others; where a
@@ -264,11 +268,13 @@ def limit_strains(work, masses, chains):
                     inverse_mass_of(masses, i),
                     inverse_mass_of(masses, j),
                     greatest[entry],
+                    forces,
+                    entry,
                 )
 
 
 @kernel
-def _shorten(a, b, mass_a, mass_b, greatest):
+def _shorten(a, b, mass_a, mass_b, greatest, forces, entry):
     real = type(a[0])
     one, zero = real(1), real(0)
     for lane in range(LANES):
@@ -281,6 +287,7 @@ def _shorten(a, b, mass_a, mass_b, greatest):
             square += delta * delta
         length = np.sqrt(square)
         scale = share * (one - greatest / length) if length > greatest else zero
+        note_limit(forces, entry, lane, scale * length)
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
             a[POSITION + k * LANES + lane] -= w_a * move

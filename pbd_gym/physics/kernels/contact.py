@@ -3,25 +3,28 @@
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import note, wall_row
 from .layout import DIM, LANES, POSITION, START, VELOCITY
+from .masses import inverse_mass_of, is_grabbed
 
 
 @kernel
-def collide_with_walls(work, masses, room):
+def collide_with_walls(work, masses, room, forces):
     """Put every free particle back into the room, with friction."""
     inverse_mass, lower_wall, upper_wall = masses.inverse_mass, room.lower, room.upper
     radius, friction = room.radius, room.friction
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
-            at = row(work, particle)
+            at, force = row(work, particle), wall_row(forces, particle)
+            mass = inverse_mass_of(masses, particle)
             for axis in range(DIM):
                 if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
                     lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                    _stop_at_walls(at, axis, lower, upper, friction)
+                    _stop_at_walls(at, mass, axis, lower, upper, friction, force)
 
 
 @kernel
-def read_velocities(work, masses, room, inverse_h, rest_speed):
+def read_velocities(work, masses, room, h, rest_speed, forces):
     """Read the velocities off the positions, v = (x - x_start)/h; at a wall, with restitution.
 
     rest_speed [m/s]: slower impacts do not bounce, else gravity alone would make resting particles
@@ -31,18 +34,26 @@ def read_velocities(work, masses, room, inverse_h, rest_speed):
     radius, restitution = room.radius, room.restitution
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
-            at = row(work, particle)
+            at, force = row(work, particle), wall_row(forces, particle)
+            mass = inverse_mass_of(masses, particle)
             for axis in range(DIM):
                 if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
                     lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                    _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h)
+                    _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force)
                 else:
-                    for lane in range(axis * LANES, (axis + 1) * LANES):
-                        at[VELOCITY + lane] = (at[POSITION + lane] - at[START + lane]) * inverse_h
+                    _read_off(at, mass, axis, h)
 
 
 @kernel
-def _stop_at_walls(at, axis, lower, upper, friction):
+def _read_off(at, mass, axis, h):
+    for lane in range(LANES):
+        if not is_grabbed(mass, at, lane):
+            k = axis * LANES + lane
+            at[VELOCITY + k] = (at[POSITION + k] - at[START + k]) / h
+
+
+@kernel
+def _stop_at_walls(at, mass, axis, lower, upper, friction, force):
     """Clamp one coordinate; Coulomb friction holds back the others.
 
     Macklin et al. 2014, eq. 23-24, with one coefficient for both kinds of friction.
@@ -51,9 +62,10 @@ def _stop_at_walls(at, axis, lower, upper, friction):
     one, zero = real(1), real(0)
     for lane in range(LANES):
         before = at[POSITION + axis * LANES + lane]
-        after = min(max(before, lower), upper)
+        after = before if is_grabbed(mass, at, lane) else min(max(before, lower), upper)
         depth = abs(after - before)
         at[POSITION + axis * LANES + lane] = after
+        note(force, axis * LANES + lane, after - before)
         square = zero
         for k in range(DIM):
             slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
@@ -64,11 +76,13 @@ def _stop_at_walls(at, axis, lower, upper, friction):
         share = min(held / distance, one) if distance > zero else zero
         for k in range(DIM):
             slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
-            at[POSITION + k * LANES + lane] -= share * slide if k != axis else zero
+            rub = share * slide if k != axis else zero
+            at[POSITION + k * LANES + lane] -= rub
+            note(force, k * LANES + lane, -rub)
 
 
 @kernel
-def _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h):
+def _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force):
     """Read the velocity of one axis; at a wall the restituted one (Mueller et al. 2020, eq. 34).
 
     The speed before the impact is the predicted one, gravity's kick included. Setting the outward
@@ -77,13 +91,17 @@ def _bounce(at, axis, lower, upper, restitution, rest_speed, inverse_h):
     """
     zero = type(restitution)(0)
     for lane in range(LANES):
-        position = min(max(at[POSITION + axis * LANES + lane], lower), upper)
+        if is_grabbed(mass, at, lane):
+            continue
+        before = at[POSITION + axis * LANES + lane]
+        position = min(max(before, lower), upper)
         at[POSITION + axis * LANES + lane] = position
         impact = at[VELOCITY + axis * LANES + lane]
-        speed = (position - at[START + axis * LANES + lane]) * inverse_h
+        read = (position - at[START + axis * LANES + lane]) / h
         rebound = -restitution * impact if abs(impact) > rest_speed else zero
         at_lower = position <= lower
         at_upper = position >= upper
-        speed = max(rebound, zero) if at_lower else speed
+        speed = max(rebound, zero) if at_lower else read
         speed = min(rebound, zero) if at_upper else speed
         at[VELOCITY + axis * LANES + lane] = speed
+        note(force, axis * LANES + lane, position - before + (speed - read) * h)

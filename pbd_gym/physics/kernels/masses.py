@@ -28,3 +28,11 @@ def in_lane(inverse_mass, at, lane):
     if inverse_mass is None:
         return at[MASS + lane]
     return inverse_mass
+
+
+@kernel
+def is_grabbed(inverse_mass, at, lane):
+    """Tell whether a particle that is free as built is a pin in a lane."""
+    if inverse_mass is None:
+        return at[MASS + lane] == 0
+    return False

@@ -3,12 +3,13 @@
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import bend_row, distance_row, note
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
 
 @kernel
-def project_distances(work, masses, distances, inverse_h2, iteration):
+def project_distances(work, masses, distances, inverse_h2, iteration, forces):
     """Project every distance along its current direction (Mueller et al. 2007, eq. 10-11).
 
     A compliant one is projected in the first iteration only: a second would make it stiffer.
@@ -27,11 +28,12 @@ def project_distances(work, masses, distances, inverse_h2, iteration):
                 rest[index],
                 alpha * inverse_h2,
                 stiffness[index],
+                distance_row(forces, index),
             )
 
 
 @kernel
-def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness):
+def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness, force):
     real = type(a[0])
     one, zero = real(1), real(0)
     for lane in range(LANES):
@@ -45,6 +47,7 @@ def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness):
         length = np.sqrt(square)
         # coincident particles have no direction: left to the other constraints
         scale = share * (one - rest / length) if length > zero else zero
+        note(force, lane, scale * length)
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
             a[POSITION + k * LANES + lane] -= w_a * move
@@ -52,7 +55,7 @@ def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness):
 
 
 @kernel
-def project_distances_from_start(work, masses, distances, inverse_h2, iteration):
+def project_distances_from_start(work, masses, distances, inverse_h2, iteration, forces):
     """Project every distance along its direction at the start of the substep (SHAKE)."""
     pairs, rest = distances.pairs, distances.rest
     compliance, stiffness = distances.compliance, distances.stiffness
@@ -68,28 +71,31 @@ def project_distances_from_start(work, masses, distances, inverse_h2, iteration)
                 rest[index],
                 alpha * inverse_h2,
                 stiffness[index],
+                distance_row(forces, index),
             )
 
 
 @kernel
-def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
+def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness, force):
     """One Newton step of (|x_a - x_b|^2 - rest^2) / (2 rest) = 0 along the start direction."""
     real = type(a[0])
     one, zero, half = real(1), real(0), real(0.5)
     inverse = one / rest
     for lane in range(LANES):
-        square, aligned = zero, zero
+        square, aligned, square_start = zero, zero, zero
         for k in range(DIM):
             now = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
             square += now * now
             aligned += now * start
+            square_start += start * start
         slope = max(aligned, zero) * inverse * inverse
         w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
         total = (w_a + w_b) * slope + alpha
         scale = (
             stiffness * half * (square * inverse - rest) * inverse / total if total > zero else zero
         )
+        note(force, lane, scale * np.sqrt(square_start))
         for k in range(DIM):
             start = a[START + k * LANES + lane] - b[START + k * LANES + lane]
             move = scale * start
@@ -98,19 +104,24 @@ def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness):
 
 
 @kernel
-def project_distance_velocities(work, masses, distances):
+def project_distance_velocities(work, masses, distances, h, forces):
     """Remove the velocity along rigid distances (the second half of RATTLE)."""
     pairs, compliance = distances.pairs, distances.compliance
     for index in range(pairs.shape[0]):
         i, j = pairs[index, 0], pairs[index, 1]
         if compliance[index] == 0:
             _distance_velocity(
-                row(work, i), row(work, j), inverse_mass_of(masses, i), inverse_mass_of(masses, j)
+                row(work, i),
+                row(work, j),
+                inverse_mass_of(masses, i),
+                inverse_mass_of(masses, j),
+                h,
+                distance_row(forces, index),
             )
 
 
 @kernel
-def _distance_velocity(a, b, mass_a, mass_b):
+def _distance_velocity(a, b, mass_a, mass_b, h, force):
     real = type(a[0])
     one, zero = real(1), real(0)
     for lane in range(LANES):
@@ -123,6 +134,7 @@ def _distance_velocity(a, b, mass_a, mass_b):
             square += delta * delta
             rate += delta * (a[VELOCITY + k * LANES + lane] - b[VELOCITY + k * LANES + lane])
         scale = share * rate / square if square > zero else zero
+        note(force, lane, scale * np.sqrt(square) * h)
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
             a[VELOCITY + k * LANES + lane] -= w_a * move
@@ -130,7 +142,7 @@ def _distance_velocity(a, b, mass_a, mass_b):
 
 
 @kernel
-def project_bends(work, masses, bends, inverse_h2):
+def project_bends(work, masses, bends, inverse_h2, forces):
     """Draw C = x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta.
 
     Dry friction holds C where it is, with a force of its own limit. It is what real cloth shows
@@ -149,11 +161,12 @@ def project_bends(work, masses, bends, inverse_h2):
             inverse_mass_of(masses, k),
             compliance[index] * inverse_h2,
             friction[index] / inverse_h2,
+            bend_row(forces, index),
         )
 
 
 @kernel
-def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held):
+def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held, force):
     real = type(a[0])
     one, two, four, zero = real(1), real(2), real(4), real(0)
     for lane in range(LANES):
@@ -162,7 +175,7 @@ def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held):
         total = w_a + four * w_b + w_c
         elastic = one / (total + alpha) if total > zero else zero
         static = one / total if total > zero else zero
-        square = zero
+        square, pull = zero, zero
         for k in range(DIM):
             at, start = POSITION + k * LANES + lane, START + k * LANES + lane
             change = a[at] - a[start] - two * (b[at] - b[start]) + c[at] - c[start]
@@ -176,3 +189,5 @@ def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held):
             a[at] -= w_a * move
             b[at] += two * w_b * move
             c[at] -= w_c * move
+            pull += move * move
+        note(force, lane, np.sqrt(pull))
