@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbd_gym.physics.model import Model
+from pbd_gym.physics.tables import entries_of_links, links_in_rows
 
 
 def kinetic_energy(model: Model, v: np.ndarray) -> np.ndarray:
@@ -34,12 +35,11 @@ def elastic_energy(model: Model, x: np.ndarray) -> np.ndarray:
 
     C^2 / (2 alpha) of each; rigid constraints store none.
     """
-    chains = model.chains.compliance[model.chains.entries()]
-    bends = bend_violations(model, x)
+    pairs, rest = links_in_rows(model.chains)
     stored = (
-        (chain_violations(model, x), chains),
+        (_lengths(x, pairs) - rest, model.chains.compliance[entries_of_links(model.chains)]),
         (distance_violations(model, x), model.distances.compliance),
-        (bends, model.bends.compliance),
+        (bend_violations(model, x), model.bends.compliance),
     )
     total = np.zeros(len(x))
     for violations, compliance in stored:
@@ -66,13 +66,13 @@ def angular_momentum(model: Model, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.sum(np.cross(r, p), axis=1)
 
 
-def chain_strains(model: Model, x: np.ndarray) -> np.ndarray:
+def link_strains(model: Model, x: np.ndarray) -> np.ndarray:
     """Return the relative change of length of each link of `Model.links`, (W, links)."""
     pairs, rest = model.links()
     return _lengths(x, pairs) / rest - 1.0
 
 
-def chain_violations(model: Model, x: np.ndarray) -> np.ndarray:
+def link_violations(model: Model, x: np.ndarray) -> np.ndarray:
     """Return length - rest length of each link of `Model.links`, (W, links) [m]."""
     pairs, rest = model.links()
     return _lengths(x, pairs) - rest

@@ -205,8 +205,8 @@ def test_strains_and_violations_are_those_of_the_geometry():
     builder.add_bend(1, 2, 3, compliance=0.1)
     model = builder.build()
     x = model.positions[None]
-    np.testing.assert_allclose(readouts.chain_strains(model, x), [[0.25, 0.25, 0.0]])
-    np.testing.assert_allclose(readouts.chain_violations(model, x), [[0.2, 0.2, 0.0]])
+    np.testing.assert_allclose(readouts.link_strains(model, x), [[0.25, 0.25, 0.0]])
+    np.testing.assert_allclose(readouts.link_violations(model, x), [[0.2, 0.2, 0.0]])
     diagonal = np.sqrt(5.0) - 2.0
     np.testing.assert_allclose(readouts.distance_violations(model, x), [[diagonal]])
     np.testing.assert_allclose(readouts.distance_strains(model, x), [[diagonal / 2.0]])

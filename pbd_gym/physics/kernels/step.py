@@ -127,7 +127,9 @@ def _project(work, model, found, timing, iterations, second_order, forces):
             project_rods(work, masses, model.rods, inverse_h2)
             collide_with_self(work, masses, model.self_collision, found, timing.h, timing.gravity)
         if second_order is not None:
-            project_distances_from_start(work, masses, model.distances, inverse_h2, iteration, forces)
+            project_distances_from_start(
+                work, masses, model.distances, inverse_h2, iteration, forces
+            )
         else:
             project_distances(work, masses, model.distances, inverse_h2, iteration, forces)
         project_limits(work, masses, model.limits, inverse_h2, iteration)
