@@ -50,7 +50,8 @@ class ModelBuilder(TetherBuilder, BendBuilder, ContactBuilder):
         along them. Second order. It conserves linear and angular momentum, follows a parabola
         exactly, and its energy oscillates within (omega h)^2 without drift, for as long as the
         substeps have one length. All else (compliant links, implicit and slack chains, bends,
-        contacts) is projected and dissipates as with "pbd". For pendulums and short chains, and where numbers matter.
+        contacts) is projected and dissipates as with "pbd". For pendulums and short chains, and
+        where numbers matter.
 
         Raises:
             ValueError: Naming the index and the value of what cannot be.
