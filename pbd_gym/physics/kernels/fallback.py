@@ -1,9 +1,9 @@
 """What is done where a solve fails.
 
-Second order: along the directions of the substep's start a link cannot be brought to its length once it has
-turned too far, and Newton's method does not arrive where light particles whip between heavy ones.
-Left alone, the error would feed the next substep and energy would grow without bound. The substep
-is solved again in first order, which takes energy out instead.
+Second order: along the directions of the substep's start a link cannot be brought to its length
+once it has turned too far, and Newton's method does not arrive where light particles whip between
+heavy ones. Left alone, the error would feed the next substep and energy would grow without bound.
+The substep is solved again in first order, which takes energy out instead.
 
 Any order: constraints that contradict each other may send a particle anywhere. A control step that
 ends beyond the speed limit is taken again with every substep held within it.
