@@ -56,6 +56,17 @@ def test_a_grabbed_particle_is_a_pin_to_the_last_bit(integrator):
     np.testing.assert_array_equal(grabbed.v, pinned.v)
 
 
+def test_a_grabbed_particle_is_a_pin_even_where_a_solve_fails():
+    states = [rope(integrator="rattle"), pinned_rope([0, 7], integrator="rattle")]
+    states[0].grabbed[:] = True
+    targets = states[0].x[:, [0, 7]] + np.array([0.013, 0.07])
+    for state in states:
+        state.v[0, 3:5] = [(0.0, 300.0), (0.0, -300.0)]  # a link turns by more than a radian
+        state.step(DT, SUBSTEPS, targets)
+    np.testing.assert_array_equal(states[0].x, states[1].x)
+    np.testing.assert_array_equal(states[0].v, states[1].v)
+
+
 def test_a_released_particle_keeps_the_velocity_of_the_pin():
     state = rope(gravity=(0.0, 0.0), grabbable=(0,), particles=2)
     state.grabbed[:] = True

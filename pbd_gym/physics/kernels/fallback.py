@@ -13,6 +13,7 @@ import numpy as np
 
 from ..compiling import kernel, row
 from .layout import DIM, FAILED, KEPT, LANES, POSITION, START, TOO_FAST, VELOCITY
+from .masses import inverse_mass_of, is_grabbed
 
 # Error of a rigid length beyond which the solve has failed, as a share of it.
 _LENGTH_ERROR = 0.02
@@ -74,10 +75,13 @@ def return_to_prediction(work, masses, h):
     """Keep what was found, and go back to where the particles were predicted to be."""
     for particle in range(masses.inverse_mass.shape[0]):
         if masses.inverse_mass[particle] > 0:
-            at = row(work, particle)
-            for lane in range(DIM * LANES):
-                at[KEPT + lane] = at[POSITION + lane]
-                at[POSITION + lane] = at[START + lane] + at[VELOCITY + lane] * h
+            at, mass = row(work, particle), inverse_mass_of(masses, particle)
+            for k in range(DIM):
+                for lane in range(LANES):
+                    at_k = k * LANES + lane
+                    at[KEPT + at_k] = at[POSITION + at_k]
+                    if not is_grabbed(mass, at, lane):
+                        at[POSITION + at_k] = at[START + at_k] + at[VELOCITY + at_k] * h
 
 
 @kernel
@@ -114,15 +118,16 @@ def is_too_fast(work, masses, limit):
 @kernel
 def limit_moves(work, masses, reach):
     """Let no free particle move farther than `reach` in a substep; put back what is no number."""
+    one = type(reach)(1)
     for particle in range(masses.inverse_mass.shape[0]):
         if masses.inverse_mass[particle] > 0:
-            at = row(work, particle)
+            at, mass = row(work, particle), inverse_mass_of(masses, particle)
             for lane in range(LANES):
                 square = reach * 0
                 for k in range(DIM):
                     move = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
                     square += move * move
-                share = _share_within(square, reach)
+                share = one if is_grabbed(mass, at, lane) else _share_within(square, reach)
                 for k in range(DIM):
                     now, start = at[POSITION + k * LANES + lane], at[START + k * LANES + lane]
                     limited = start + share * (now - start) if share > 0 else start
@@ -132,14 +137,15 @@ def limit_moves(work, masses, reach):
 @kernel
 def limit_velocities(work, masses, speed):
     """Let no free particle be faster than `speed`; stop what is no number."""
+    one = type(speed)(1)
     for particle in range(masses.inverse_mass.shape[0]):
         if masses.inverse_mass[particle] > 0:
-            at = row(work, particle)
+            at, mass = row(work, particle), inverse_mass_of(masses, particle)
             for lane in range(LANES):
                 square = speed * 0
                 for k in range(DIM):
                     square += at[VELOCITY + k * LANES + lane] * at[VELOCITY + k * LANES + lane]
-                share = _share_within(square, speed)
+                share = one if is_grabbed(mass, at, lane) else _share_within(square, speed)
                 for k in range(DIM):
                     now = at[VELOCITY + k * LANES + lane]
                     at[VELOCITY + k * LANES + lane] = share * now if share > 0 else speed * 0
