@@ -4,8 +4,9 @@
 """
 
 from pbd_gym.physics import shapes
-from pbd_gym.physics.bodies import Linkage, Sheet, Strand
+from pbd_gym.physics.bodies import Linkage, Mesh, Polygon, Sheet, Strand
 from pbd_gym.physics.builder import ModelBuilder
+from pbd_gym.physics.frames import frame_targets
 from pbd_gym.physics.model import Model
 from pbd_gym.physics.snapshot import Snapshot
 from pbd_gym.physics.tables import Forces
@@ -16,11 +17,14 @@ __all__ = [
     "Adaptive",
     "Forces",
     "Linkage",
+    "Mesh",
     "Model",
     "ModelBuilder",
+    "Polygon",
     "Sheet",
     "Snapshot",
     "Strand",
     "World",
+    "frame_targets",
     "shapes",
 ]

@@ -1,4 +1,4 @@
-"""What a renderer draws of a model: which particles form a rope, a pendulum, a cloth."""
+"""What a renderer draws of a model: which particles form a rope, a pendulum, a cloth, a body."""
 
 from __future__ import annotations
 
@@ -29,4 +29,28 @@ class Sheet:
     radius: float
 
 
-Body = Strand | Linkage | Sheet
+@dataclass(frozen=True)
+class Polygon:
+    """A body seen by its closed outline: particle indices once around.
+
+    The outline is drawn as a smooth curve of a radius [m], or from corner to corner.
+    """
+
+    particles: tuple[int, ...]
+    radius: float
+    smooth: bool = True
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A body seen by its surface: triangles of particle indices, anticlockwise from outside."""
+
+    triangles: tuple[tuple[int, int, int], ...]
+
+    @property
+    def particles(self) -> tuple[int, ...]:
+        """Particle indices of the surface, each once."""
+        return tuple(sorted({particle for triangle in self.triangles for particle in triangle}))
+
+
+Body = Strand | Linkage | Sheet | Polygon | Mesh

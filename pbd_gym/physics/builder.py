@@ -8,13 +8,14 @@ import numpy as np
 
 from pbd_gym.physics.building.bending import BendBuilder
 from pbd_gym.physics.building.contacts import ContactBuilder
+from pbd_gym.physics.building.solids import SolidBuilder
 from pbd_gym.physics.building.tethers import TetherBuilder
 from pbd_gym.physics.model import Model
 
 INTEGRATORS = ("pbd", "rattle")
 
 
-class ModelBuilder(TetherBuilder, BendBuilder, ContactBuilder):
+class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder):
     """Collects particles and what holds between them; `build` checks it all and returns a Model.
 
     Args:
@@ -79,6 +80,7 @@ class ModelBuilder(TetherBuilder, BendBuilder, ContactBuilder):
             room=self._room_table(),
             self_collision=self._self_collision_table(),
             bodies=tuple(self._bodies),
+            **self._solid_tables(),
         )
 
 

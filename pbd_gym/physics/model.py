@@ -11,6 +11,7 @@ import numpy as np
 
 from pbd_gym.physics.bodies import Body
 from pbd_gym.physics.tables import (
+    Attachments,
     Bends,
     Chains,
     Distances,
@@ -22,6 +23,8 @@ from pbd_gym.physics.tables import (
     Room,
     Ropes,
     SelfCollision,
+    ShapeMatches,
+    Volumes,
     links_in_rows,
 )
 
@@ -44,6 +47,9 @@ class Model:
         rods: Rows of particles whose bending is solved directly, or None.
         hinges: Angles between triangles, or None.
         folds: Pairs of triangles that are flat at rest, or None.
+        volumes: Areas (2D) or volumes (3D) that are kept, or None.
+        shape_matches: Bodies that keep their shape, or None.
+        attachments: Particles held at an offset from another, or None.
         room: Walls.
         self_collision: Particles that keep their distance, or None.
         bodies: What a renderer draws.
@@ -63,6 +69,9 @@ class Model:
     rods: Rods | None
     hinges: Hinges | None
     folds: Folds | None
+    volumes: Volumes | None
+    shape_matches: ShapeMatches | None
+    attachments: Attachments | None
     room: Room
     self_collision: SelfCollision | None
     bodies: tuple[Body, ...]

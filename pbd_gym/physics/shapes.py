@@ -1,4 +1,4 @@
-"""Ropes, pendulums and cloths: functions that add a body to a ModelBuilder."""
+"""Ropes, pendulums, cloths, soft and rigid bodies: functions that add one to a ModelBuilder."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numpy as np
 
 from pbd_gym.physics.bodies import Linkage, Sheet, Strand
 from pbd_gym.physics.builder import ModelBuilder
+from pbd_gym.physics.solid_shapes import rigid_box, soft_ball, soft_body_2d
+
+__all__ = ["cloth", "pendulum", "rigid_box", "rope", "soft_ball", "soft_body_2d"]
 
 
 def rope(

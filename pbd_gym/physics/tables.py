@@ -161,6 +161,60 @@ class Folds(NamedTuple):
     compliance: Any
 
 
+class Volumes(NamedTuple):
+    """Closed outlines that keep their area (2D), closed surfaces that keep their volume (3D).
+
+    Attributes:
+        offsets: (V + 1,) first entry of each in `particles`.
+        particles: Particles of each, once.
+        facet_offsets: (V + 1,) first facet of each.
+        facets: (F, dim) particles of each edge or triangle, oriented outwards.
+        rest: (V,) signed area [m2] or volume [m3].
+        compliance: (V,) -d area/d pressure [m3/N] or -d volume/d pressure [m5/N].
+        least: (V,) least sum of inverse mass times gradient squared to divide by.
+    """
+
+    offsets: Any
+    particles: Any
+    facet_offsets: Any
+    facets: Any
+    rest: Any
+    compliance: Any
+    least: Any
+
+
+class ShapeMatches(NamedTuple):
+    """Bodies drawn to a rest shape that moves and turns with them.
+
+    Attributes:
+        offsets: (S + 1,) first entry of each body.
+        particles: (L,) particle of each entry.
+        weight: (L,) its share in the body's mass.
+        rest: (L, dim) its place in the rest shape [m].
+        softness: (S,) compliance times mass [s2]; 0 is rigid.
+    """
+
+    offsets: Any
+    particles: Any
+    weight: Any
+    rest: Any
+    softness: Any
+
+
+class Attachments(NamedTuple):
+    """Particles held at a fixed offset from another.
+
+    Attributes:
+        pairs: (A, 2) particle and anchor.
+        offsets: (A, dim) position of the particle relative to the anchor [m].
+        compliance: (A,) [m/N].
+    """
+
+    pairs: Any
+    offsets: Any
+    compliance: Any
+
+
 class Room(NamedTuple):
     """Axis-aligned walls (the seed's window).
 
@@ -210,6 +264,9 @@ class Parameters(NamedTuple):
     rods: Rods | None
     hinges: Hinges | None
     folds: Folds | None
+    volumes: Volumes | None
+    shape_matches: ShapeMatches | None
+    attachments: Attachments | None
     room: Room
     self_collision: SelfCollision | None
     second_order: bool | None

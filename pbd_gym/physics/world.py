@@ -89,7 +89,7 @@ class World:
 
     def _allocate(self) -> tuple[Any, ...]:
         """Return the scratch of one thread: work, and that of self-collision or None."""
-        shape = (self.model.num_particles + 2, self._kernels.WIDTH)
+        shape = (self.model.num_particles + 3, self._kernels.WIDTH)
         work = np.zeros(shape, dtype=self.dtype)
         if self.model.self_collision is None:
             return work, None
@@ -251,7 +251,12 @@ class World:
         model = self.model
         kinds = ("self_collision", "ropes", "limits", "rods", "hinges", "folds")
         present = [kind for kind in kinds if getattr(model, kind) is not None]
-        extras = {"grabs": len(model.grabbable) > 0, "adaptive": adaptive, "forces": record}
+        extras = {
+            "solids": model.volumes is not None,
+            "grabs": len(model.grabbable) > 0,
+            "adaptive": adaptive,
+            "forces": record,
+        }
         variant = [f"{model.dim}D", model.integrator, f"{self.lanes} lanes", self.dtype.name]
         variant += [kind.replace("_", "-") for kind in present]
         variant += [name for name, wanted in extras.items() if wanted]
@@ -306,6 +311,9 @@ def _parameters(model: Model) -> Parameters:
         rods=model.rods,
         hinges=model.hinges,
         folds=model.folds,
+        volumes=model.volumes,
+        shape_matches=model.shape_matches,
+        attachments=model.attachments,
         room=model.room,
         self_collision=model.self_collision,
         second_order=True if model.integrator == "rattle" else None,

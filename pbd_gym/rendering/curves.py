@@ -43,6 +43,12 @@ def smooth_line(points: np.ndarray, pieces: int) -> np.ndarray:
     return points if len(points) < 3 else spline(len(points), pieces) @ points
 
 
+def smooth_loop(points: np.ndarray, pieces: int) -> np.ndarray:
+    """Return the closed curve (M * pieces, dim) through points (M, dim), once around."""
+    around = np.concatenate([points[-2:], points, points[:2]])
+    return smooth_line(around, pieces)[2 * pieces : (2 + len(points)) * pieces]
+
+
 def smooth_sheet(points: np.ndarray, pieces: int) -> np.ndarray:
     """Return the surface through points (rows, columns, dim); as given where one is not finite."""
     if not np.isfinite(points).all():

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.bodies import Body, Linkage, Sheet
+from pbd_gym.physics.bodies import Body, Linkage, Mesh, Polygon, Sheet
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import OrthographicCamera
 from pbd_gym.rendering.canvas import Canvas
-from pbd_gym.rendering.curves import finite_rows, finite_runs, smooth_line
+from pbd_gym.rendering.curves import finite_rows, finite_runs, smooth_line, smooth_loop
 from pbd_gym.rendering.marks import (
     BEAD,
     GHOST,
@@ -29,6 +29,7 @@ from pbd_gym.rendering.scene import (
 )
 
 _MARGIN = 0.05
+_INSIDE = 0.55  # how much paler a body is than its outline
 
 
 class PlanarPainter:
@@ -95,13 +96,22 @@ class PlanarPainter:
     def _reach(self, body: Body) -> float:
         """How far from its particles a body is drawn [canvas pixels]."""
         bobs = bob_radius(self._model, body).max() if isinstance(body, Linkage) else 0.0
-        size = max(self._width(body.radius), bobs * self.camera.pixels_per_metre)
+        radius = 0.0 if isinstance(body, Mesh) else body.radius
+        size = max(self._width(radius), bobs * self.camera.pixels_per_metre)
         # A smooth curve bulges out between particles, by less than a tenth of the view.
         return size + 50.0 * self._canvas.unit
 
     def _paint_body(self, body: Body, pixels: np.ndarray, fill: Colour, edge: Colour) -> None:
         if isinstance(body, Linkage):
             self._paint_linkage(body, pixels, fill, edge)
+            return
+        if isinstance(body, Polygon):
+            self._paint_polygon(body, pixels, fill, edge)
+            return
+        if isinstance(body, Mesh):
+            for triangle in body.triangles:
+                outline = Polygon(triangle, 0.0, smooth=False)
+                self._paint_polygon(outline, pixels, fill, edge)
             return
         particles = particles_of(body)
         width = self._width(body.radius)
@@ -112,6 +122,20 @@ class PlanarPainter:
             self._canvas.stroke(line, width + 1.6 * self._canvas.unit, edge)
         for line in lines:
             self._canvas.stroke(line, width - 0.8 * self._canvas.unit, fill)
+
+    def _paint_polygon(
+        self, polygon: Polygon, pixels: np.ndarray, fill: Colour, edge: Colour
+    ) -> None:
+        """Fill the inside lightly and draw the outline; all of it or, if a corner lacks, nothing."""
+        corners = pixels[particles_of(polygon)]
+        if not np.isfinite(corners).all():
+            return
+        outline = smooth_loop(corners, 3) if polygon.smooth else corners
+        closed = np.concatenate([outline, outline[:1]])
+        width = self._width(polygon.radius)
+        self._canvas.stroke(closed, width + 1.6 * self._canvas.unit, edge)
+        self._canvas.polygon(outline, palette.mix(fill, palette.PAPER, _INSIDE))
+        self._canvas.stroke(closed, width - 0.8 * self._canvas.unit, fill)
 
     def _paint_linkage(
         self, linkage: Linkage, pixels: np.ndarray, fill: Colour, edge: Colour

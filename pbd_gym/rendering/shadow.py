@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.bodies import Body, Linkage, Sheet
+from pbd_gym.physics.bodies import Body, Linkage, Mesh, Sheet
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering.canvas import ribbon
 from pbd_gym.rendering.curves import finite_runs
@@ -48,6 +48,9 @@ def _casters(
             [particles[:-1, :-1], particles[:-1, 1:], particles[1:, 1:], particles[1:, :-1]], axis=2
         ).reshape(-1, 4)
         return [(dropped[cells], height[cells].mean(axis=1))]
+    if isinstance(body, Mesh):
+        corners = np.array(body.triangles)[:, [0, 1, 2, 2]]
+        return [(dropped[corners], height[corners].mean(axis=1))]
     casters = []
     for run in finite_runs(np.column_stack([dropped[particles], height[particles]])):
         flat = ribbon(run[:, :2], 2.0 * body.radius)

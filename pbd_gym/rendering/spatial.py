@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.bodies import Body, Linkage, Sheet
+from pbd_gym.physics.bodies import Body, Linkage, Mesh, Polygon, Sheet
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import PerspectiveCamera
@@ -22,7 +22,7 @@ from pbd_gym.rendering.scene import (
     split_goals,
 )
 from pbd_gym.rendering.shadow import shadow_patches
-from pbd_gym.rendering.weave import weave
+from pbd_gym.rendering.weave import shade, weave
 
 _MARGIN = 0.03
 _AZIMUTH, _ELEVATION = float(np.radians(-62.0)), float(np.radians(32.0))
@@ -98,6 +98,15 @@ class SpatialPainter:
             sides = (fill, fill) if ghost else (palette.PALE_BLUE, palette.CLOTH_BLUE)
             scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides))
             return
+        if isinstance(body, Mesh):
+            corners = x[np.array(body.triangles)]
+            corners = corners[np.isfinite(corners).all(axis=(1, 2))]
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            sides = (fill, edge) if ghost else (palette.CLOTH_BLUE, palette.DARK_BLUE)
+            tone = np.ones(len(corners))
+            colours = shade(corners, normal, tone, self.camera.eye, _LIGHT, sides)
+            scene.add_mesh(corners, colours)
+            return
         if isinstance(body, Linkage):
             for run in finite_runs(points):
                 scene.add_line(run, body.radius, palette.STEEL, palette.DARK_STEEL)
@@ -105,6 +114,8 @@ class SpatialPainter:
                 if radius > 0.0:
                     scene.add_ball(point, radius, fill, edge)
             return
+        if isinstance(body, Polygon):
+            points = np.concatenate([points, points[:1]])
         for run in finite_runs(points):
             scene.add_line(smooth_line(run, 3), body.radius, fill, edge)
 

@@ -48,13 +48,34 @@ def weave(
     seen = np.isfinite(patches).all(axis=(1, 2))
     patches, tone = patches[seen], tone[seen]
     normal = np.cross(patches[:, 2] - patches[:, 0], patches[:, 3] - patches[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    front = np.einsum("ij,ij->i", normal, eye - patches.mean(axis=1)) > 0.0
-    facing = np.where(front, 1.0, -1.0) * (normal @ light)
+    return Mesh(patches, shade(patches, normal, tone, eye, light, sides))
+
+
+def shade(
+    patches: np.ndarray,
+    normal: np.ndarray,
+    tone: np.ndarray,
+    eye: np.ndarray,
+    light: np.ndarray,
+    sides: tuple[Colour, Colour],
+) -> np.ndarray:
+    """Return the colours (Q, 3) in which patches are seen.
+
+    Args:
+        patches: Corners (Q, K, 3) [m].
+        normal: Of any length (Q, 3), on the side of the first colour.
+        tone: Brightness of their own (Q,), 1 for plain.
+        eye: From where they are seen (3,) [m].
+        light: Unit vector towards the lamp (3,).
+        sides: Colours of the two sides.
+    """
+    unit = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    front = np.einsum("ij,ij->i", unit, eye - patches.mean(axis=1)) > 0.0
+    facing = np.where(front, 1.0, -1.0) * (unit @ light)
     # Half Lambert: the side turned away is still modelled and not one flat dark spot.
     brightness = _AMBIENT + (_BRIGHTEST - _AMBIENT) * (0.5 + 0.5 * facing)
     base = np.where(front[:, None], np.array(sides[0], float), np.array(sides[1], float))
-    return Mesh(patches, np.clip(base * (brightness * tone)[:, None], 0.0, 255.0))
+    return np.clip(base * (brightness * tone)[:, None], 0.0, 255.0)
 
 
 def _pattern(rows: int, columns: int, pieces: int) -> np.ndarray:

@@ -1,6 +1,7 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
 from ..compiling import borrowed, kernel, row
+from .attachment import project_attachments
 from .chain import (
     limit_strains,
     project_chain_velocities,
@@ -22,6 +23,7 @@ from .forces import forget_forces, keep_forces, store_forces, take_up_kept_force
 from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
 from .limit import project_limits
 from .masses import inverse_mass_of, is_grabbed
+from .matching import match_shapes
 from .rod import project_rods
 from .rope import finish_ropes, project_ropes
 from .sweep import (
@@ -31,6 +33,7 @@ from .sweep import (
     project_distances_from_start,
 )
 from .tiles import aim_pins, load, move_pins, store
+from .volume import project_volumes
 
 # Iterations of the first-order solve that replaces a failed one.
 _AGAIN = 4
@@ -48,7 +51,7 @@ def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, t
         targets: Where pins and grabbed particles are at the end of the step, (W, P + G, DIM) [m].
         tiles: First and last + 1 tile of LANES worlds.
         worlds: Those worlds that are advanced, in the order of the lanes, or None for all.
-        work: Scratch (N + 2, WIDTH); the last row is zero.
+        work: Scratch (N + 3, WIDTH); the last row is zero.
         found: Scratch of self-collision (candidate pairs, their numbers), or None.
         grabbed: Which particles are grabbed, (W, G), or None if none can be.
         forces: Scratch for multipliers and where the forces go, or None if nobody asks.
@@ -133,6 +136,9 @@ def _project(work, model, found, timing, iterations, second_order, forces):
         else:
             project_distances(work, masses, model.distances, inverse_h2, iteration, forces)
         project_limits(work, masses, model.limits, inverse_h2, iteration)
+        project_attachments(work, masses, model.attachments, inverse_h2, iteration)
+        match_shapes(work, masses, model.shape_matches, inverse_h2, iteration)
+        project_volumes(work, masses, model.volumes, inverse_h2, iteration)
         if second_order is not None:
             project_chains_from_start(work, masses, model.chains, inverse_h2, iteration, forces)
         else:
