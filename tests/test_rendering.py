@@ -54,12 +54,31 @@ def mixed():
     return builder.build()
 
 
+def bodies_2d():
+    builder = ModelBuilder(2)
+    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    outline = 0.3 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    shapes.soft_body_2d(builder, outline + np.array([-0.5, 0.2]), mass=0.2)
+    shapes.rigid_box(builder, (0.5, 0.2), (0.5, 0.4), mass=0.2)
+    return builder.build()
+
+
+def bodies_3d():
+    builder = ModelBuilder(3)
+    shapes.soft_ball(builder, (-0.3, 0, 0.3), 0.2, mass=0.1)
+    shapes.rigid_box(builder, (0.3, 0, 0.3), (0.2, 0.3, 0.2), mass=0.2)
+    builder.set_ground(0.0)
+    return builder.build()
+
+
 SCENES = {
     "rope": (rope(), PLANE),
     "walled rope": (rope(walls=True), PLANE),
     "pendulum": (pendulum([1.0, 0.3, 0.3]), PLANE),
     "cloth": (cloth(), SPACE),
     "rope and pendulum in space": (mixed(), SPACE),
+    "bodies": (bodies_2d(), PLANE),
+    "bodies in space": (bodies_3d(), SPACE),
 }
 every_scene = pytest.mark.parametrize(("model", "view"), SCENES.values(), ids=SCENES.keys())
 
@@ -172,6 +191,38 @@ def test_the_two_sides_of_a_cloth_differ():
     turned = model.positions.reshape(CLOTH, CLOTH, 3)[:, ::-1].reshape(-1, 3)
     difference = as_ints(renderer.draw(model.positions)) - as_ints(renderer.draw(turned))
     assert np.abs(difference).max() > 60
+
+
+def test_the_inside_of_a_body_is_filled_paler_than_its_outline():
+    model = bodies_2d()
+    renderer = Renderer(model, PLANE, size=(256, 256))
+    empty, frame = as_ints(renderer.draw(no_goal(model))), as_ints(renderer.draw(model.positions))
+    # 96 pixels per metre: 0.3 m around (-0.5, 0.2), and (0.5, 0.2) within 0.25 m and 0.2 m
+    rows, columns = np.mgrid[:256, :256]
+    x, y = (columns - 127.5) / 96, (127.5 - rows) / 96
+    for inside in ((x + 0.5) ** 2 + (y - 0.2) ** 2 < 0.26**2, np.hypot(x - 0.5, y - 0.2) < 0.17):
+        colours = np.unique(frame[inside], axis=0)
+        assert len(colours) == 1  # no squared paper shines through
+        assert (frame != empty).any(axis=2)[inside].all()
+        assert colours.sum() > frame.sum(axis=2).min() + 100
+    outside = ((x + 0.5) ** 2 + (y - 0.2) ** 2 > 0.34**2) & (x < 0.2)
+    np.testing.assert_array_equal(frame[outside], empty[outside])
+
+
+def test_a_ball_is_lit_from_above_and_casts_a_shadow():
+    model = bodies_3d()
+    renderer = Renderer(model, SPACE, size=(256, 256))
+    empty = as_ints(renderer.draw(no_goal(model)))
+    x = model.positions.copy()
+    x[162:] = np.nan  # the ball alone
+    frame = as_ints(renderer.draw(x))
+    blue = frame[..., 2] - frame[..., 0] > 60
+    rows, _ = np.nonzero(blue)
+    upper, lower = rows.min() + 8, rows.max() - 8
+    brightness = [frame[row][blue[row]].sum(axis=1).mean() for row in (upper, lower)]
+    assert brightness[0] > brightness[1] + 50
+    drop = (empty - frame).min(axis=2)
+    assert drop[~blue].max() > 10  # what is darker and not of the ball's colour
 
 
 def test_what_is_near_hides_what_is_far():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ def check_different(groups: np.ndarray, what: str) -> None:
     refuse_if(wrong, what, groups, f"it needs {groups.shape[1]} different particles")
 
 
-def check_duplicates(groups: np.ndarray, what: str) -> None:
+def check_duplicates(groups: Iterable[np.ndarray], what: str) -> None:
     """Refuse a constraint that holds between the same particles as an earlier one."""
     seen: dict[tuple[int, ...], int] = {}
     for index, group in enumerate(groups):

@@ -40,7 +40,7 @@ def frame_targets(points: Any, position: Any, rotation: Any) -> np.ndarray:
         raise ValueError(f"rotation has shape {turn.shape}; expected a quaternion (..., 4)")
     for name, values in (("points", carried), ("position", origin), ("rotation", turn)):
         if not np.isfinite(values).all():
-            raise ValueError(f"{name} are {values}; they must be finite")
+            raise ValueError(f"{name} is {values}; its numbers must be finite")
     matrix = _planar(turn) if dim == 2 else _spatial(turn)
     return origin[..., None, :] + np.sum(carried[:, None, :] * matrix[..., None, :, :], axis=-1)
 

@@ -126,7 +126,7 @@ class PlanarPainter:
     def _paint_polygon(
         self, polygon: Polygon, pixels: np.ndarray, fill: Colour, edge: Colour
     ) -> None:
-        """Fill the inside lightly and draw the outline; all of it or, if a corner lacks, nothing."""
+        """Fill the inside and draw the outline; nothing if a corner is not finite."""
         corners = pixels[particles_of(polygon)]
         if not np.isfinite(corners).all():
             return

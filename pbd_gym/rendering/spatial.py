@@ -13,6 +13,7 @@ from pbd_gym.rendering.curves import finite_runs, smooth_line
 from pbd_gym.rendering.display_list import DisplayList
 from pbd_gym.rendering.floor import floor_pixels
 from pbd_gym.rendering.marks import GHOST, paint_target
+from pbd_gym.rendering.palette import Colour
 from pbd_gym.rendering.scene import (
     Segment,
     bob_radius,
@@ -99,13 +100,7 @@ class SpatialPainter:
             scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides))
             return
         if isinstance(body, Mesh):
-            corners = x[np.array(body.triangles)]
-            corners = corners[np.isfinite(corners).all(axis=(1, 2))]
-            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            sides = (fill, edge) if ghost else (palette.CLOTH_BLUE, palette.DARK_BLUE)
-            tone = np.ones(len(corners))
-            colours = shade(corners, normal, tone, self.camera.eye, _LIGHT, sides)
-            scene.add_mesh(corners, colours)
+            self._add_surface(scene, body, x, (fill, edge))
             return
         if isinstance(body, Linkage):
             for run in finite_runs(points):
@@ -114,10 +109,19 @@ class SpatialPainter:
                 if radius > 0.0:
                     scene.add_ball(point, radius, fill, edge)
             return
-        if isinstance(body, Polygon):
-            points = np.concatenate([points, points[:1]])
-        for run in finite_runs(points):
+        closed = points[:1] if isinstance(body, Polygon) else points[:0]
+        for run in finite_runs(np.concatenate([points, closed])):
             scene.add_line(smooth_line(run, 3), body.radius, fill, edge)
+
+    def _add_surface(
+        self, scene: DisplayList, body: Mesh, x: np.ndarray, sides: tuple[Colour, Colour]
+    ) -> None:
+        """Add the triangles of a body; its inside, where one looks in, has the second colour."""
+        corners = x[np.array(body.triangles)]
+        corners = corners[np.isfinite(corners).all(axis=(1, 2))]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        tone = np.ones(len(corners))
+        scene.add_mesh(corners, shade(corners, normal, tone, self.camera.eye, _LIGHT, sides))
 
     def _paint_ghost(self, body: Body, goal: np.ndarray) -> None:
         """Draw a body where all its particles shall go."""

@@ -62,9 +62,7 @@ class SolidBuilder(ParticleBuilder):
         edges = np.stack([corners, np.roll(corners, -1)], axis=1)
         self._volumes.append((edges, float(pressure), float(compliance)))
 
-    def add_volume(
-        self, triangles: Any, *, pressure: float = 1.0, compliance: float = 0.0
-    ) -> None:
+    def add_volume(self, triangles: Any, *, pressure: float = 1.0, compliance: float = 0.0) -> None:
         """Keep the volume within a closed surface (3D; Mueller et al. 2007, eq. 14-15).
 
         The volume V is signed by the triangles' orientation, so that a body turned inside out turns
@@ -150,7 +148,9 @@ class SolidBuilder(ParticleBuilder):
             least[index] = _COLLAPSED * (inverse_mass @ np.sum(gradient**2, axis=1))
             extent = np.max(np.ptp(positions[groups[index]], axis=0))
             if abs(placed[index]) <= _FLAT * extent**self.dim:
-                raise ValueError(f"volume {index} is {placed[index]} as placed; it must not be flat")
+                raise ValueError(
+                    f"volume {index} is {placed[index]} as placed; it must not be flat"
+                )
         return Volumes(
             offsets=_offsets(groups),
             particles=_joined(groups),
@@ -174,7 +174,7 @@ class SolidBuilder(ParticleBuilder):
                 )
         check_compliance(compliance, "shape match")
         check_duplicates(groups, "shape match")
-        particles, sizes = _joined(groups), [len(group) for group in groups]
+        particles = _joined(groups)
         points = np.array(self._positions)[particles]
         # what a pin weighs depends on who else is one at the time: the kernel says
         mass = np.where(self._pinned, 0.0, self._masses)[particles]
@@ -184,7 +184,9 @@ class SolidBuilder(ParticleBuilder):
             weight[first:last] = mass[first:last] / max(total[index], _LEAST_MASS)
             points[first:last] -= np.mean(points[first:last], axis=0)
             if not np.any(points[first:last]):
-                raise ValueError(f"shape match {index} has all its {sizes[index]} particles on one spot")
+                raise ValueError(
+                    f"shape match {index} has all its {last - first} particles on one spot"
+                )
         return ShapeMatches(_offsets(groups), particles, weight, points, compliance * total)
 
     def _attachment_table(self) -> Attachments:
