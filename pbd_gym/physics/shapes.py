@@ -11,7 +11,16 @@ from pbd_gym.physics.bodies import Linkage, Sheet, Strand
 from pbd_gym.physics.builder import ModelBuilder
 from pbd_gym.physics.solid_shapes import rigid_box, soft_ball, soft_body_2d
 
-__all__ = ["cloth", "pendulum", "rigid_box", "rope", "soft_ball", "soft_body_2d"]
+__all__ = [
+    "bend_sheet",
+    "chain",
+    "cloth",
+    "pendulum",
+    "rigid_box",
+    "rope",
+    "soft_ball",
+    "soft_body_2d",
+]
 
 
 def rope(
