@@ -53,7 +53,7 @@ def test_a_cloth_that_lies_flat_lies_still() -> None:
 
 
 def test_crumpled_cloths_come_to_rest_below_their_held_corners() -> None:
-    worlds, moving, resting = 64, 75, 60
+    worlds, moving, resting = 128, 75, 60
     env = make(worlds)
     pins = env.task.model.pins
     generator = np.random.default_rng(0)
@@ -70,10 +70,10 @@ def test_crumpled_cloths_come_to_rest_below_their_held_corners() -> None:
         env.step(action.reshape(worlds, 6).astype(np.float32))
     for _ in range(resting):
         env.step(np.zeros((worlds, 6), dtype=np.float32))
-    # The aim is all of them. 2 s after the hands stop, 80 to 90 % are below 3 cm/s (79.7 % for this
-    # seed); in the others a fold still slides. The bound guards what is reached, it is not the aim.
-    assert (speeds(env) < 0.03).mean() >= 0.7
-    assert np.median(speeds(env)) < 0.01
+    # Of 1536 worlds of three other seeds 98 % are below 3 cm/s 2 s after the hands stop; in each of
+    # the others one last fold is still falling. One more than that may fall among 128.
+    assert (speeds(env) < 0.03).mean() >= 0.97
+    assert np.median(speeds(env)) < 0.002
 
 
 @pytest.mark.parametrize("links", [1, 2, 3])

@@ -162,6 +162,7 @@ def cloth(
     shear_compliance: float = 1e-3,
     bending_compliance: float = 10.0,
     bending_friction: float = 0.0,
+    thread_damping: float = 0.0,
     collision_distance: float = 0.0,
     collision_friction: float = 0.0,
     pinned: Iterable[tuple[int, int]] = (),
@@ -184,6 +185,7 @@ def cloth(
         shear_compliance: Of a diagonal [m/N].
         bending_compliance: l^3/EI [m/N].
         bending_friction: Force up to which dry friction holds each bend as it is [N].
+        thread_damping: Rate at which the velocities of linked particles approach each other [1/s].
         collision_distance: That the particles keep from each other [m]; 0 for none.
         collision_friction: Coulomb coefficient between particles.
         pinned: (row, column) of the particles that are held; negative ones count from the end.
@@ -212,6 +214,7 @@ def cloth(
             thread,
             compliance=stretch_compliance,
             strain_limit=strain_limit,
+            damping=thread_damping,
         )
     if collision_distance > 0.0:
         builder.set_self_collision(indices, collision_distance, friction=collision_friction)

@@ -39,6 +39,7 @@ class Chains(NamedTuple):
         rest: (L,) rest length of the link that starts at an entry [m]; a chain's last is unused.
         compliance: (L,) of a stretched link [m/N].
         greatest: (L,) length beyond which a link is cut short after all else [m].
+        damping: (L,) rate at which the velocities of a link's ends approach each other [1/s].
     """
 
     offsets: Any
@@ -46,6 +47,7 @@ class Chains(NamedTuple):
     rest: Any
     compliance: Any
     greatest: Any
+    damping: Any
 
 
 class Ropes(NamedTuple):

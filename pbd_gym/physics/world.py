@@ -94,8 +94,9 @@ class World:
         if self.model.self_collision is None:
             return work, None
         colliding = len(self.model.self_collision.particles)
-        pairs = np.zeros((self.lanes, _PAIRS_PER_PARTICLE * colliding, 2), dtype=np.int32)
-        return work, (pairs, np.zeros(self.lanes, dtype=np.int64))
+        pairs = np.zeros((self.lanes, _PAIRS_PER_PARTICLE * colliding, 3), dtype=np.int32)
+        counts = np.zeros(self.lanes, dtype=np.int64)
+        return work, (pairs, counts, np.zeros((1, self.lanes), dtype=self.dtype))
 
     def __getstate__(self) -> dict[str, Any]:
         kept = ("model", "num_worlds", "dtype", "num_threads", "lanes", "_x", "_v", "_grabbed")

@@ -83,7 +83,7 @@ class Cloth(Task):
     stretch_compliance: float = number(1e-4, 0.0, 1.0, "m/N")
     shear_compliance: float = number(0.1, 0.0, 1e3, "m/N")
     bending_compliance: float = number(10.0, 0.0, 1e6, "m/N")
-    bending_friction: float = number(0.003, 0.0, 1e3, "N")
+    thread_damping: float = number(20.0, 0.0, 1e3, "1/s")
     friction: float = number(0.5, 0.0, 10.0)
     substeps: int = number(16, 1, 1000)
     max_speed: float = number(1.0, 1e-3, 100.0, "m/s")
@@ -106,7 +106,7 @@ class Cloth(Task):
             stretch_compliance=self.stretch_compliance,
             shear_compliance=self.shear_compliance,
             bending_compliance=self.bending_compliance,
-            bending_friction=self.bending_friction,
+            thread_damping=self.thread_damping,
             strain_limit=0.01,
             collision_distance=0.7 * spacing,
             collision_friction=self.friction,

@@ -167,6 +167,14 @@ def test_a_strain_limit_is_not_negative(limit):
     )
 
 
+@pytest.mark.parametrize("damping", [-0.1, NAN, INF])
+def test_the_damping_of_a_chain_is_finite_and_not_negative(damping):
+    builder = line()
+    builder.add_chain([0, 1, 2])
+    builder.add_chain([2, 3], damping=damping)
+    refused(builder, f"damping of chain entry 3 is {damping}; finite and at least 0")
+
+
 @pytest.mark.parametrize("friction", [-0.1, NAN, INF])
 def test_the_friction_of_a_bend_is_finite_and_not_negative(friction):
     builder = line()

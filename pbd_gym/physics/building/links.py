@@ -24,6 +24,7 @@ class _Chain(NamedTuple):
     rest: np.ndarray
     compliance: float
     strain_limit: float
+    damping: float
     slack: bool
     implicit: bool
 
@@ -44,6 +45,7 @@ class LinkBuilder(ParticleBuilder):
         rest: Any = None,
         compliance: float = 0.0,
         strain_limit: float = np.inf,
+        damping: float = 0.0,
         slack: bool = False,
         implicit: bool = False,
     ) -> None:
@@ -55,6 +57,7 @@ class LinkBuilder(ParticleBuilder):
             compliance: Of a link under tension [m/N]; 0 is inextensible.
             strain_limit: Strain beyond which a link is cut short whatever pulls on it; +inf for no
                 limit. For cloth, whose crossing threads are solved in turn.
+            damping: Rate at which the velocities of a link's ends approach each other [1/s].
             slack: Let links be shorter than their rest: they pull but do not push.
             implicit: Let links pull along the directions that they will have, which stays stable
                 under any tension. For many short links and heavy end masses: an explicit chain
@@ -62,7 +65,7 @@ class LinkBuilder(ParticleBuilder):
                 further than half a link in a substep. Costs two to three times as much.
 
         Raises:
-            ValueError: If a slack or implicit chain has a strain limit.
+            ValueError: If a slack or implicit chain has a strain limit or damping.
         """
         entries = as_indices(particles)
         if rest is None:
@@ -76,12 +79,15 @@ class LinkBuilder(ParticleBuilder):
             raise ValueError(
                 f"strain_limit of a slack or implicit chain is {strain_limit}; they have none"
             )
+        if implicit and damping != 0.0:
+            raise ValueError(f"damping of a slack or implicit chain is {damping}; they have none")
         self._chains.append(
             _Chain(
                 entries,
                 np.array(lengths),
                 float(compliance),
                 float(strain_limit),
+                float(damping),
                 bool(slack),
                 implicit,
             )
@@ -190,6 +196,7 @@ def _chain_table(rows: list[_Chain]) -> Chains:
         rest=joined([np.append(chain.rest, 1.0) for chain in rows], np.float64),
         compliance=np.repeat(np.array([chain.compliance for chain in rows], np.float64), sizes),
         greatest=joined([np.append(length, np.inf) for length in greatest], np.float64),
+        damping=np.repeat(np.array([chain.damping for chain in rows], np.float64), sizes),
     )
 
 
@@ -211,6 +218,8 @@ def _check_chains(chains: Chains, count: int, what: str) -> None:
     refuse_if(
         wrong, f"greatest length of {what} entry", chains.greatest, "a strain limit is at least 0"
     )
+    wrong = ~(np.isfinite(chains.damping) & (chains.damping >= 0.0))
+    refuse_if(wrong, f"damping of {what} entry", chains.damping, "finite and at least 0 [1/s]")
 
 
 def _check_distances(distances: Distances, count: int) -> None:

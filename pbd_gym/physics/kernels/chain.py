@@ -13,7 +13,7 @@ and the particles move by x_i -= w_i n_i s_i, x_(i+1) += w_(i+1) n_i s_i (Muelle
 import numpy as np
 
 from ..compiling import kernel, row
-from .forces import note_chain, note_limit
+from .forces import note_chain
 from .layout import (
     COUPLING,
     DIM,
@@ -244,51 +244,3 @@ def _apply(a, b, after, mass_a, mass_b, quantity):
             move = step * a[DIRECTION + k * LANES + lane]
             a[quantity + k * LANES + lane] -= in_lane(mass_a, a, lane) * move
             b[quantity + k * LANES + lane] += in_lane(mass_b, b, lane) * move
-
-
-@kernel
-def limit_strains(work, masses, chains, forces):
-    """Shorten links that are stretched beyond their limit, one after another.
-
-    Threads that cross are solved in turn, so the last ones leave an error in the others; where a
-    cloth is pulled taut between its pins it would take many turns to vanish.
-    """
-    offsets, particles = chains.offsets, chains.particles
-    greatest = chains.greatest
-    count = offsets.shape[0] - 1
-    for turn in range(2 * count):
-        # there and back, so that no thread is always the last
-        chain = turn if turn < count else 2 * count - 1 - turn
-        for entry in range(offsets[chain], offsets[chain + 1] - 1):
-            if greatest[entry] < np.inf:
-                i, j = particles[entry], particles[entry + 1]
-                _shorten(
-                    row(work, i),
-                    row(work, j),
-                    inverse_mass_of(masses, i),
-                    inverse_mass_of(masses, j),
-                    greatest[entry],
-                    forces,
-                    entry,
-                )
-
-
-@kernel
-def _shorten(a, b, mass_a, mass_b, greatest, forces, entry):
-    real = type(a[0])
-    one, zero = real(1), real(0)
-    for lane in range(LANES):
-        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
-        total = w_a + w_b
-        share = one / total if total > zero else zero
-        square = zero
-        for k in range(DIM):
-            delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
-            square += delta * delta
-        length = np.sqrt(square)
-        scale = share * (one - greatest / length) if length > greatest else zero
-        note_limit(forces, entry, lane, scale * length)
-        for k in range(DIM):
-            move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
-            a[POSITION + k * LANES + lane] -= w_a * move
-            b[POSITION + k * LANES + lane] += w_b * move

@@ -15,7 +15,7 @@ from .masses import in_lane, inverse_mass_of
 # body: its own constraints hold them apart.
 _NEIGHBOURHOOD = 3.0
 # Speed at which overlapping particles are let apart [m/s].
-_PARTING_SPEED = 0.1
+_PARTING_SPEED = 0.03
 # Force that presses touching particles together, for friction, in units of a particle's weight:
 # what pushes them apart is limited, so the solver does not know it.
 _PRESSURE = 2.0
@@ -25,68 +25,66 @@ _PRESSURE = 2.0
 def find_pairs(work, masses, collision, found, dt):
     """List, for every lane, the pairs that can come into contact within the control step.
 
-    found: pairs (LANES, capacity, 2) and their number (LANES,). What exceeds the capacity is left
-    out (the capacity is several times what a crumpled cloth needs).
+    found: pairs (LANES, capacity, 3), their number (LANES,) and scratch (1, LANES). What exceeds
+    the capacity is left out (the capacity is several times what a crumpled cloth needs).
     """
     if collision is None:
         return
-    pairs, counts = found
+    pairs, counts, scratch = found
     particles, rest, distance = collision.particles, masses.positions, collision.distance
     apart = distance * work.dtype.type(_NEIGHBOURHOOD)
+    excess = row(scratch, 0)
     for lane in range(LANES):
         counts[lane] = 0
     for first in range(particles.shape[0]):
         a = row(work, particles[first])
         for second in range(first + 1, particles.shape[0]):
             b = row(work, particles[second])
-            if _count_near(a, b, distance, dt) > 0:
+            if _can_meet(a, b, excess, distance, dt):
                 i, j = particles[first], particles[second]
                 if _far_at_rest(rest, i, j, apart):
-                    _list_pair(a, b, i, j, distance, dt, pairs, counts)
+                    _list_pair(i, j, excess, pairs, counts)
 
 
 @kernel
-def _count_near(a, b, distance, dt):
-    """Count the lanes in which two particles can meet."""
-    near = 0
-    for lane in range(LANES):
-        near += 1 if _excess(a, b, lane, distance, dt) < distance * 0 else 0
-    return near
+def _can_meet(a, b, excess, distance, dt):
+    """Tell whether two particles can meet within dt in any lane: where `excess` [m2] is negative.
 
-
-@kernel
-def _excess(a, b, lane, distance, dt):
-    """Return a square [m2] that is negative where two particles can meet within dt.
-
-    They can where |x_a - x_b| < distance + |v_a - v_b| dt, and (p + q)^2 <= 2 p^2 + 2 q^2 saves
-    the root.
+    They can where |x_a - x_b| < distance + |v_a - v_b| dt, and (p + q)^2 <= 3/2 p^2 + 3 q^2 saves
+    the root; what it adds at rest allows for velocities that change.
     """
-    square, travel = distance * 0, distance * 0
-    for k in range(DIM):
-        at = k * LANES + lane
-        delta = a[POSITION + at] - b[POSITION + at]
-        motion = (a[VELOCITY + at] - b[VELOCITY + at]) * dt
-        square += delta * delta
-        travel += motion * motion
-    reach = travel + distance * distance
-    return square - reach - reach
+    real = type(distance)
+    zero, near = real(0), False
+    reach, spread = real(1.5) * distance * distance, real(3) * dt * dt
+    for lane in range(LANES):
+        square, travel = zero, zero
+        for k in range(DIM):
+            at = k * LANES + lane
+            delta = a[POSITION + at] - b[POSITION + at]
+            motion = a[VELOCITY + at] - b[VELOCITY + at]
+            square += delta * delta
+            travel += motion * motion
+        beyond = square - reach - spread * travel
+        excess[lane] = beyond
+        near |= beyond < zero
+    return near
 
 
 @kernel
 def _far_at_rest(rest, i, j, apart):
     """Tell whether two particles were built at least `apart` from each other."""
-    square = apart * 0
+    square = type(apart)(0)
     for k in range(DIM):
         square += (rest[i, k] - rest[j, k]) * (rest[i, k] - rest[j, k])
     return square >= apart * apart
 
 
 @kernel
-def _list_pair(a, b, i, j, distance, dt, pairs, counts):
+def _list_pair(i, j, excess, pairs, counts):
     """Add a pair to the lists of the lanes in which it can meet."""
+    zero = type(excess[0])(0)
     for lane in range(LANES):
-        near = _excess(a, b, lane, distance, dt) < distance * 0
-        if near and counts[lane] < pairs.shape[1]:
+        if excess[lane] < zero and counts[lane] < pairs.shape[1]:
             pairs[lane, counts[lane], 0] = i
             pairs[lane, counts[lane], 1] = j
             counts[lane] += 1
@@ -102,8 +100,8 @@ def _square_distance(a, b, quantity, lane, zero):
 
 
 @kernel
-def collide_with_self(work, masses, collision, found, h, gravity):
-    """Push the listed pairs apart to the collision distance, with friction between them.
+def collide_with_self(work, masses, collision, found, h):
+    """Push the listed pairs apart to the collision distance, and note which of them touch.
 
     A pair that began the substep closer than that is let apart at `_PARTING_SPEED` only (Macklin et
     al. 2019, eq. 10): pushed out at once, it would fly apart at depth/h, and folds that lie through
@@ -111,11 +109,10 @@ def collide_with_self(work, masses, collision, found, h, gravity):
     """
     if collision is None:
         return
-    pairs, counts = found
+    pairs, counts, _ = found
     zero = work.dtype.type(0)
     distance = collision.distance
     parting = work.dtype.type(_PARTING_SPEED) * h
-    held = collision.friction * work.dtype.type(_PRESSURE) * gravity * h * h
     for lane in range(LANES):
         for index in range(counts[lane]):
             i, j = pairs[lane, index, 0], pairs[lane, index, 1]
@@ -124,7 +121,9 @@ def collide_with_self(work, masses, collision, found, h, gravity):
             w_a = in_lane(inverse_mass_of(masses, i), a, lane)
             w_b = in_lane(inverse_mass_of(masses, j), b, lane)
             total = w_a + w_b
-            if zero < square < distance * distance and total > zero:
+            touches = zero < square < distance * distance and total > zero
+            pairs[lane, index, 2] = touches
+            if touches:
                 length = np.sqrt(square)
                 before = np.sqrt(_square_distance(a, b, START, lane, zero))
                 depth = max(min(distance, before + parting) - length, zero)
@@ -133,22 +132,31 @@ def collide_with_self(work, masses, collision, found, h, gravity):
                     move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
                     a[POSITION + k * LANES + lane] += w_a * move
                     b[POSITION + k * LANES + lane] -= w_b * move
-                _rub(a, b, lane, w_a, w_b, held)
 
 
 @kernel
-def _rub(a, b, lane, mass_a, mass_b, held):
-    """Dry friction of a touching pair: take back its relative motion, as far as it can be held."""
-    zero, one = held * 0, held * 0 + 1
-    square = zero
-    for k in range(DIM):
-        at = k * LANES + lane
-        motion = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
-        square += motion * motion
-    size = np.sqrt(square)
-    share = min(held / size, one) / (mass_a + mass_b) if size > zero else zero
-    for k in range(DIM):
-        at = k * LANES + lane
-        motion = (a[POSITION + at] - a[START + at]) - (b[POSITION + at] - b[START + at])
-        a[POSITION + at] -= mass_a * share * motion
-        b[POSITION + at] += mass_b * share * motion
+def rub_against_self(work, masses, collision, found, h, gravity):
+    """Dry friction of touching pairs: take back their relative velocity, as far as can be held.
+
+    It acts on the velocities that all constraints have left: rubbed before, the links would pull
+    the pair on, and a heap would creep for seconds.
+    """
+    if collision is None:
+        return
+    pairs, counts, _ = found
+    zero, one = work.dtype.type(0), work.dtype.type(1)
+    held = collision.friction * work.dtype.type(_PRESSURE) * gravity * h
+    for lane in range(LANES):
+        for index in range(counts[lane]):
+            if pairs[lane, index, 2]:
+                i, j = pairs[lane, index, 0], pairs[lane, index, 1]
+                a, b = row(work, i), row(work, j)
+                speed = np.sqrt(_square_distance(a, b, VELOCITY, lane, zero))
+                w_a = in_lane(inverse_mass_of(masses, i), a, lane)
+                w_b = in_lane(inverse_mass_of(masses, j), b, lane)
+                share = min(held / speed, one) / (w_a + w_b) if speed > zero else zero
+                for k in range(DIM):
+                    at = VELOCITY + k * LANES + lane
+                    change = share * (a[at] - b[at])
+                    a[at] -= w_a * change
+                    b[at] += w_b * change

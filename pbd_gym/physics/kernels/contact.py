@@ -4,7 +4,7 @@ import numpy as np
 
 from ..compiling import kernel, row
 from .forces import note, wall_row
-from .layout import DIM, LANES, POSITION, START, VELOCITY
+from .layout import DIM, LANES, MULTIPLIER, POSITION, START, VELOCITY
 from .masses import inverse_mass_of, is_grabbed
 
 
@@ -56,22 +56,24 @@ def _read_off(at, mass, axis, h):
 def _stop_at_walls(at, mass, axis, lower, upper, friction, force):
     """Clamp one coordinate; Coulomb friction holds back the others.
 
-    Macklin et al. 2014, eq. 23-24, with one coefficient for both kinds of friction.
+    Macklin et al. 2014, eq. 23-24, with one coefficient for both kinds of friction. In two loops
+    over the lanes: LLVM does not vectorise one that writes at an offset known only at run time.
     """
     real = type(friction)
     one, zero = real(1), real(0)
     for lane in range(LANES):
         before = at[POSITION + axis * LANES + lane]
         after = before if is_grabbed(mass, at, lane) else min(max(before, lower), upper)
-        depth = abs(after - before)
+        at[MULTIPLIER + lane] = friction * abs(after - before)
         at[POSITION + axis * LANES + lane] = after
         note(force, axis * LANES + lane, after - before)
+    for lane in range(LANES):
+        held = at[MULTIPLIER + lane]
         square = zero
         for k in range(DIM):
             slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
             square += slide * slide if k != axis else zero
         distance = np.sqrt(square)
-        held = friction * depth
         # static: the whole slide is taken back; kinetic: as much as friction can hold
         share = min(held / distance, one) if distance > zero else zero
         for k in range(DIM):

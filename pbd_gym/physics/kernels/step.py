@@ -2,13 +2,8 @@
 
 from ..compiling import borrowed, kernel, row
 from .attachment import project_attachments
-from .chain import (
-    limit_strains,
-    project_chain_velocities,
-    project_chains,
-    project_chains_from_start,
-)
-from .collision import collide_with_self, find_pairs
+from .chain import project_chain_velocities, project_chains, project_chains_from_start
+from .collision import collide_with_self, find_pairs, rub_against_self
 from .contact import collide_with_walls, read_velocities
 from .fallback import (
     has_failed,
@@ -32,6 +27,7 @@ from .sweep import (
     project_distances,
     project_distances_from_start,
 )
+from .thread import damp_chains, limit_strains
 from .tiles import aim_pins, load, move_pins, store
 from .volume import project_volumes
 
@@ -52,7 +48,7 @@ def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, t
         tiles: First and last + 1 tile of LANES worlds.
         worlds: Those worlds that are advanced, in the order of the lanes, or None for all.
         work: Scratch (N + 3, WIDTH); the last row is zero.
-        found: Scratch of self-collision (candidate pairs, their numbers), or None.
+        found: Scratch of self-collision (see `find_pairs`), or None.
         grabbed: Which particles are grabbed, (W, G), or None if none can be.
         forces: Scratch for multipliers and where the forces go, or None if nobody asks.
         model: The Parameters. A table that is None is known when compiling: each function that
@@ -81,6 +77,10 @@ def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, t
                     limit_moves(work, masses, timing.speed_limit * timing.h)
                 read_velocities(work, masses, model.room, timing.h, timing.rest_speed, forces)
                 _finish(work, model, timing, model.second_order, forces)
+                rub_against_self(
+                    work, masses, model.self_collision, found, timing.h, timing.gravity
+                )
+                damp_chains(work, masses, model.chains, timing.h)
                 if attempt > 0:
                     limit_velocities(work, masses, timing.speed_limit)
             if attempt == 0:
@@ -128,7 +128,7 @@ def _project(work, model, found, timing, iterations, second_order, forces):
             project_hinges(work, masses, model.hinges, inverse_h2)
             project_folds(work, masses, model.folds, inverse_h2)
             project_rods(work, masses, model.rods, inverse_h2)
-            collide_with_self(work, masses, model.self_collision, found, timing.h, timing.gravity)
+            collide_with_self(work, masses, model.self_collision, found, timing.h)
         if second_order is not None:
             project_distances_from_start(
                 work, masses, model.distances, inverse_h2, iteration, forces

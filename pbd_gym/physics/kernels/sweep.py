@@ -145,28 +145,44 @@ def _distance_velocity(a, b, mass_a, mass_b, h, force):
 def project_bends(work, masses, bends, inverse_h2, forces):
     """Draw C = x_a - 2 x_b + x_c to zero: straight rest, linear, keeps both momenta.
 
-    Dry friction holds C where it is, with a force of its own limit. It is what real cloth shows
-    when bent back and forth, and what lets a crumpled one come to rest: it stops slow creeping
-    entirely, as a dashpot cannot, and hardly brakes quick motion.
+    Dry friction holds C where it is, with a force of its own limit: what real cloth shows when bent
+    back and forth.
     """
     triples, compliance, friction = bends.triples, bends.compliance, bends.friction
     for index in range(triples.shape[0]):
         i, j, k = triples[index, 0], triples[index, 1], triples[index, 2]
-        _bend(
-            row(work, i),
-            row(work, j),
-            row(work, k),
-            inverse_mass_of(masses, i),
-            inverse_mass_of(masses, j),
-            inverse_mass_of(masses, k),
-            compliance[index] * inverse_h2,
-            friction[index] / inverse_h2,
-            bend_row(forces, index),
-        )
+        a, b, c = row(work, i), row(work, j), row(work, k)
+        mass_a, mass_b = inverse_mass_of(masses, i), inverse_mass_of(masses, j)
+        mass_c, force = inverse_mass_of(masses, k), bend_row(forces, index)
+        alpha, held = compliance[index] * inverse_h2, friction[index] / inverse_h2
+        if held > 0:
+            _bend_with_friction(a, b, c, mass_a, mass_b, mass_c, alpha, held, force)
+        else:
+            _bend(a, b, c, mass_a, mass_b, mass_c, alpha, force)
 
 
 @kernel
-def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, held, force):
+def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, force):
+    real = type(a[0])
+    one, two, four, zero = real(1), real(2), real(4), real(0)
+    for lane in range(LANES):
+        w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
+        w_c = in_lane(mass_c, c, lane)
+        total = w_a + four * w_b + w_c
+        share = one / (total + alpha) if total > zero else zero
+        pull = zero
+        for k in range(DIM):
+            at = POSITION + k * LANES + lane
+            move = share * (a[at] - two * b[at] + c[at])
+            a[at] -= w_a * move
+            b[at] += two * w_b * move
+            c[at] -= w_c * move
+            pull += move * move
+        note(force, lane, np.sqrt(pull))
+
+
+@kernel
+def _bend_with_friction(a, b, c, mass_a, mass_b, mass_c, alpha, held, force):
     real = type(a[0])
     one, two, four, zero = real(1), real(2), real(4), real(0)
     for lane in range(LANES):
