@@ -70,9 +70,9 @@ def test_crumpled_cloths_come_to_rest_below_their_held_corners() -> None:
         env.step(action.reshape(worlds, 6).astype(np.float32))
     for _ in range(resting):
         env.step(np.zeros((worlds, 6), dtype=np.float32))
-    # Of 1536 worlds of three other seeds 98 % are below 3 cm/s 2 s after the hands stop; in each of
-    # the others one last fold is still falling. One more than that may fall among 128.
-    assert (speeds(env) < 0.03).mean() >= 0.97
+    # Of 1536 worlds of three other seeds 98.7 % are below 3 cm/s 2 s after the hands stop; in the
+    # others a last fold is still falling. Of these 128 all are.
+    assert (speeds(env) < 0.03).mean() >= 0.98
     assert np.median(speeds(env)) < 0.002
 
 
