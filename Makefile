@@ -18,8 +18,9 @@ RUN := runs/PBDRope-v0-ppo-0
 train: .venv/.installed-train ## train PBDRope-v0: model, learning curve and video
 	$(BIN)/python train/train.py $(if $(ARGS)$(if $(wildcard $(RUN)/checkpoint.pkl),,new),--env pbd_gym:PBDRope-v0 --video $(ARGS),--resume $(RUN))
 
+# Two processes, each with files of its own: most of the time goes into compiling kernels.
 test: .venv/.installed-test ## run the tests
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: .venv/.installed-all ## check style, formatting, types, imports and spelling
 	$(BIN)/ruff check

@@ -69,16 +69,16 @@ def test_registering_twice_is_silent():
 def test_the_first_step_comes_soon_in_a_fresh_process(id):
     code = (
         "import time\n"
-        "begin = time.perf_counter()\n"
         "import gymnasium\n"
         f"env = gymnasium.make('pbd_gym:{id}')\n"
         "env.reset(seed=0)\n"
         "env.step(env.action_space.sample())\n"
-        "print(time.perf_counter() - begin)"
+        "print(time.process_time())"
     )
     best = float("inf")
-    # the first try may fill the caches; others allow for whatever else the machine does
-    for _ in range(5):
+    # the processor time of the whole process, so that whatever else the machine does matters
+    # little; the first try may fill the caches
+    for _ in range(3):
         result = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
         )

@@ -91,10 +91,9 @@ def _borrowed(typing_context: Any, value: Any) -> Any:
             for owner in ("meminfo", "parent"):
                 setattr(view, owner, cgutils.get_null_value(getattr(view, owner).type))
             return view._getvalue()
-        if isinstance(kind, types.BaseTuple):
-            for index, inner in enumerate(kind.types):
-                item = without_owner(context, builder, inner, builder.extract_value(part, index))
-                part = builder.insert_value(part, item, index)
+        for index, inner in enumerate(getattr(kind, "types", ())):  # of a tuple
+            item = without_owner(context, builder, inner, builder.extract_value(part, index))
+            part = builder.insert_value(part, item, index)
         return part
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
