@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pbd_gym.physics.building.bending import BendBuilder
+from pbd_gym.physics.building.colliders import ColliderBuilder
 from pbd_gym.physics.building.contacts import ContactBuilder
 from pbd_gym.physics.building.solids import SolidBuilder
 from pbd_gym.physics.building.tethers import TetherBuilder
@@ -15,7 +16,7 @@ from pbd_gym.physics.model import Model
 INTEGRATORS = ("pbd", "rattle")
 
 
-class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder):
+class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder, ColliderBuilder):
     """Collects particles and what holds between them; `build` checks it all and returns a Model.
 
     Args:
@@ -78,6 +79,7 @@ class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder):
             hinges=self._hinge_table(),
             folds=self._fold_table(),
             room=self._room_table(),
+            colliders=self._collider_table(),
             self_collision=self._self_collision_table(),
             bodies=tuple(self._bodies),
             **self._solid_tables(),

@@ -14,6 +14,7 @@ from pbd_gym.physics.tables import (
     Attachments,
     Bends,
     Chains,
+    Colliders,
     Distances,
     Folds,
     Hinges,
@@ -51,6 +52,7 @@ class Model:
         shape_matches: Bodies that keep their shape, or None.
         attachments: Particles held at an offset from another, or None.
         room: Walls.
+        colliders: Solid shapes, or None.
         self_collision: Particles that keep their distance, or None.
         bodies: What a renderer draws.
         fingerprint: SHA-256 of all but the bodies.
@@ -73,6 +75,7 @@ class Model:
     shape_matches: ShapeMatches | None
     attachments: Attachments | None
     room: Room
+    colliders: Colliders | None
     self_collision: SelfCollision | None
     bodies: tuple[Body, ...]
     fingerprint: str = field(init=False)

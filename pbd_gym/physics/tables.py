@@ -225,7 +225,8 @@ class Room(NamedTuple):
         upper: (dim,) [m], +inf where there is no wall.
         radius: Distance that particles keep from a wall [m].
         restitution: In [0, 1].
-        friction: Coulomb coefficient.
+        friction: Coulomb coefficient of what sticks.
+        kinetic_friction: Coulomb coefficient of what slides.
     """
 
     lower: Any
@@ -233,6 +234,35 @@ class Room(NamedTuple):
     radius: Any
     restitution: Any
     friction: Any
+    kinetic_friction: Any
+
+
+class Colliders(NamedTuple):
+    """C solid shapes that particles may not enter, static or carried by pins.
+
+    Attributes:
+        kinds: (C,) 0 plane, 1 box, 2 capsule; a sphere is a capsule whose ends coincide.
+        pins: (C, 2) pins that carry the start and the end; -1 where it is static.
+        starts: (C, dim) point of a plane, centre of a box, end of a capsule; from the pin [m].
+        ends: (C, dim) other end of a capsule; from the second pin [m].
+        axes: (C, dim * dim) unit axes of a box, one after another; normal of a plane.
+        sizes: (C, dim) half extents of a box; the first is the radius of a capsule [m].
+        margin: (C,) distance that particles keep from the surface [m].
+        restitution: (C,) in [0, 1].
+        friction: (C,) Coulomb coefficient of what sticks.
+        kinetic_friction: (C,) Coulomb coefficient of what slides.
+    """
+
+    kinds: Any
+    pins: Any
+    starts: Any
+    ends: Any
+    axes: Any
+    sizes: Any
+    margin: Any
+    restitution: Any
+    friction: Any
+    kinetic_friction: Any
 
 
 class SelfCollision(NamedTuple):
@@ -270,6 +300,7 @@ class Parameters(NamedTuple):
     shape_matches: ShapeMatches | None
     attachments: Attachments | None
     room: Room
+    colliders: Colliders | None
     self_collision: SelfCollision | None
     second_order: bool | None
     iterations: int
@@ -304,7 +335,7 @@ class Forces(NamedTuple):
         chains: (W, links) of the chains, the first of `Model.links`; positive where a link pulls.
         distances: (W, E); positive where a distance pulls.
         bends: (W, B) size of the force on each outer particle; the middle one feels twice that.
-        walls: (W, N, dim) of the walls on each particle, friction included.
+        walls: (W, N, dim) of walls and shapes on each particle, friction included.
     """
 
     chains: Any

@@ -250,7 +250,7 @@ class World:
     def _compile(self, substeps: int, adaptive: bool, record: bool) -> None:
         """Compile on a world of its own, so that the first real step is like any other."""
         model = self.model
-        kinds = ("self_collision", "ropes", "limits", "rods", "hinges", "folds")
+        kinds = ("colliders", "self_collision", "ropes", "limits", "rods", "hinges", "folds")
         present = [kind for kind in kinds if getattr(model, kind) is not None]
         extras = {
             "solids": model.volumes is not None,
@@ -316,6 +316,7 @@ def _parameters(model: Model) -> Parameters:
         shape_matches=model.shape_matches,
         attachments=model.attachments,
         room=model.room,
+        colliders=model.colliders,
         self_collision=model.self_collision,
         second_order=True if model.integrator == "rattle" else None,
         iterations=model.iterations,

@@ -17,7 +17,7 @@ class ContactBuilder(ParticleBuilder):
 
     def __init__(self, dim: int) -> None:
         super().__init__(dim)
-        self._room = Room(np.full(dim, -np.inf), np.full(dim, np.inf), 0.0, 0.0, 0.0)
+        self._room = Room(np.full(dim, -np.inf), np.full(dim, np.inf), 0.0, 0.0, 0.0, 0.0)
         self._self_collision: SelfCollision | None = None
 
     def set_room(
@@ -26,6 +26,7 @@ class ContactBuilder(ParticleBuilder):
         upper: Any,
         *,
         friction: float = 0.0,
+        kinetic_friction: float | None = None,
         restitution: float = 0.0,
         radius: float = 0.0,
     ) -> None:
@@ -34,18 +35,23 @@ class ContactBuilder(ParticleBuilder):
         Args:
             lower: (dim,) [m], -inf for no wall.
             upper: (dim,) [m], +inf for no wall.
-            friction: Coulomb coefficient, static and kinetic.
+            friction: Coulomb coefficient of what sticks.
+            kinetic_friction: Of what slides; the same where None.
             restitution: In [0, 1]; 0 stops, 1 returns the whole normal velocity.
             radius: Distance that particles keep from the walls [m].
         """
         corners = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
-        self._room = Room(*corners, float(radius), float(restitution), float(friction))
+        kinetic = friction if kinetic_friction is None else kinetic_friction
+        self._room = Room(
+            *corners, float(radius), float(restitution), float(friction), float(kinetic)
+        )
 
     def set_ground(
         self,
         height: float = 0.0,
         *,
         friction: float = 0.0,
+        kinetic_friction: float | None = None,
         restitution: float = 0.0,
         radius: float = 0.0,
     ) -> None:
@@ -53,7 +59,14 @@ class ContactBuilder(ParticleBuilder):
         lower = np.full(self.dim, -np.inf)
         lower[-1] = height
         upper = np.full(self.dim, np.inf)
-        self.set_room(lower, upper, friction=friction, restitution=restitution, radius=radius)
+        self.set_room(
+            lower,
+            upper,
+            friction=friction,
+            kinetic_friction=kinetic_friction,
+            restitution=restitution,
+            radius=radius,
+        )
 
     def set_self_collision(
         self, particles: Sequence[int] | np.ndarray, distance: float, *, friction: float = 0.0
@@ -82,6 +95,7 @@ class ContactBuilder(ParticleBuilder):
         refuse_if(wrong, "lower wall of axis", room.lower, allowed)
         check_in("restitution", room.restitution, 0.0, 1.0)
         check_in("friction", room.friction, 0.0, np.inf)
+        check_in("kinetic friction", room.kinetic_friction, 0.0, room.friction)
         return room
 
     def _self_collision_table(self) -> SelfCollision | None:

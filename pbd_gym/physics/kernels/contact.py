@@ -12,7 +12,7 @@ from .masses import inverse_mass_of, is_grabbed
 def collide_with_walls(work, masses, room, forces):
     """Put every free particle back into the room, with friction."""
     inverse_mass, lower_wall, upper_wall = masses.inverse_mass, room.lower, room.upper
-    radius, friction = room.radius, room.friction
+    radius, friction, kinetic = room.radius, room.friction, room.kinetic_friction
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
             at, force = row(work, particle), wall_row(forces, particle)
@@ -20,7 +20,7 @@ def collide_with_walls(work, masses, room, forces):
             for axis in range(DIM):
                 if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
                     lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                    _stop_at_walls(at, mass, axis, lower, upper, friction, force)
+                    _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force)
 
 
 @kernel
@@ -53,29 +53,29 @@ def _read_off(at, mass, axis, h):
 
 
 @kernel
-def _stop_at_walls(at, mass, axis, lower, upper, friction, force):
+def _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force):
     """Clamp one coordinate; Coulomb friction holds back the others.
 
-    Macklin et al. 2014, eq. 23-24, with one coefficient for both kinds of friction. In two loops
-    over the lanes: LLVM does not vectorise one that writes at an offset known only at run time.
+    Macklin et al. 2014, eq. 23-24. In two loops over the lanes: LLVM does not vectorise one that
+    writes at an offset known only at run time.
     """
     real = type(friction)
     one, zero = real(1), real(0)
     for lane in range(LANES):
         before = at[POSITION + axis * LANES + lane]
         after = before if is_grabbed(mass, at, lane) else min(max(before, lower), upper)
-        at[MULTIPLIER + lane] = friction * abs(after - before)
+        at[MULTIPLIER + lane] = abs(after - before)
         at[POSITION + axis * LANES + lane] = after
         note(force, axis * LANES + lane, after - before)
     for lane in range(LANES):
-        held = at[MULTIPLIER + lane]
+        depth = at[MULTIPLIER + lane]
         square = zero
         for k in range(DIM):
             slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
             square += slide * slide if k != axis else zero
         distance = np.sqrt(square)
         # static: the whole slide is taken back; kinetic: as much as friction can hold
-        share = min(held / distance, one) if distance > zero else zero
+        share = one if distance <= friction * depth else kinetic * depth / distance
         for k in range(DIM):
             slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
             rub = share * slide if k != axis else zero

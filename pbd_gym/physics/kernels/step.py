@@ -3,6 +3,7 @@
 from ..compiling import borrowed, kernel, row
 from .attachment import project_attachments
 from .chain import project_chain_velocities, project_chains, project_chains_from_start
+from .collider import collide_with_shapes
 from .collision import collide_with_self, find_pairs, rub_against_self
 from .contact import collide_with_walls, read_velocities
 from .fallback import (
@@ -71,6 +72,7 @@ def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, t
                 move_pins(x, targets, tile, worlds, work, masses, remaining)
                 _project(work, model, found, timing, model.iterations, model.second_order, forces)
                 _project_again(work, model, found, timing, model.second_order, forces)
+                collide_with_shapes(work, masses, model.colliders, timing, forces)
                 collide_with_walls(work, masses, model.room, forces)
                 limit_strains(work, masses, model.chains, forces)
                 if attempt > 0:
