@@ -67,6 +67,28 @@ def bodies_3d():
     builder = ModelBuilder(3)
     shapes.soft_ball(builder, (-0.3, 0, 0.3), 0.2, mass=0.1)
     shapes.rigid_box(builder, (0.3, 0, 0.3), (0.2, 0.3, 0.2), mass=0.2)
+    return builder.build()
+
+
+def shapes_2d():
+    builder = ModelBuilder(2)
+    shapes.rope(builder, (-0.4, 0.9), (0.9, 0.9), ROPE, mass=0.2)
+    pin = builder.add_particles((0.7, -0.6), 1.0, pinned=True)[0]
+    builder.add_plane((0.0, -0.9), (0.3, 1.0))
+    builder.add_sphere((-0.4, 0.0), 0.2)
+    builder.add_box((0.5, 0.0), (0.3, 0.1), axes=[[0.8, 0.6], [-0.6, 0.8]])
+    builder.add_capsule((0.7, -0.6), (0.2, -0.4), 0.05, pins=(pin, None))
+    return builder.build()
+
+
+def shapes_3d():
+    builder = ModelBuilder(3)
+    shapes.cloth(builder, (-0.3, 0.3, 0.6), (0, -0.6, 0), (0.6, 0, 0), (CLOTH,) * 2, mass=0.2)
+    pin = builder.add_particles((-0.3, -0.3, 0.3), 1.0, pinned=True)[0]
+    builder.add_plane((0.0, 0.5, 0.0), (0.0, -1.0, 1.0))
+    builder.add_sphere((0.0, 0.0, 0.2), 0.2)
+    builder.add_box((0.4, -0.3, 0.1), (0.1, 0.15, 0.1))
+    builder.add_capsule((-0.3, -0.3, 0.3), (-0.5, 0.3, 0.5), 0.05, pins=(pin, None))
     builder.set_ground(0.0)
     return builder.build()
 
@@ -79,6 +101,8 @@ SCENES = {
     "rope and pendulum in space": (mixed(), SPACE),
     "bodies": (bodies_2d(), PLANE),
     "bodies in space": (bodies_3d(), SPACE),
+    "shapes": (shapes_2d(), PLANE),
+    "shapes in space": (shapes_3d(), SPACE),
 }
 every_scene = pytest.mark.parametrize(("model", "view"), SCENES.values(), ids=SCENES.keys())
 
@@ -272,6 +296,54 @@ def test_walls_and_rails_are_drawn():
     assert changed(walled[12:90, 40:], open_air[12:90, 40:]) == 0
     railed = Renderer(rope(), PLANE, size=(128, 128), rails=[((-1, 0), (1, 0))]).draw(x)
     assert changed(railed[60:68], open_air[60:68]) > 100
+
+
+def seen(renderer, x, empty):
+    """Rows and columns of the pixels that differ from an empty picture."""
+    return np.nonzero((renderer.draw(x) != empty).any(axis=2))
+
+
+def test_a_shape_is_drawn_where_it_is_and_as_large_as_it_is():
+    builder = ModelBuilder(2)
+    builder.add_particles((0.0, 0.0), 1.0)
+    empty = Renderer(builder.build(), PLANE, size=(256, 256)).draw([(np.nan, np.nan)])
+    # 5 % margins leave 230.4 pixels for 2.4 m, so 96 pixels per metre; up is towards row 0.
+    builder.add_capsule((-0.5, 0.25), (0.5, 0.25), 0.25)
+    rows, columns = seen(Renderer(builder.build(), PLANE, size=(256, 256)), [(9.0, 9.0)], empty)
+    low, high = 127.5 - 0.75 * 96, 127.5 + 0.75 * 96
+    for edge, expected in ((columns.min(), low), (columns.max(), high), (rows.max(), 127.5)):
+        assert abs(edge - expected) < 2.0  # an edge of 2 units is drawn around it
+    area = (0.5 * 1.0 + np.pi * 0.25**2) * 96**2
+    rim = 2.0 * (1.0 + np.pi * 0.25) * 96  # and half a pixel more that it covers in part
+    assert len(rows) == pytest.approx(area + rim, rel=0.02)
+
+
+def test_a_ball_in_space_is_round_and_lit_from_above():
+    builder = ModelBuilder(3)
+    builder.add_particles((0.0, 0.0, 0.4), 1.0)
+    nothing = np.full((1, 3), np.nan)
+    empty = Renderer(builder.build(), SPACE, size=(256, 256)).draw(nothing)
+    builder.add_sphere((0.0, 0.0, 0.4), 0.3)
+    renderer = Renderer(builder.build(), SPACE, size=(256, 256))
+    rows, columns = seen(renderer, nothing, empty)
+    assert len(rows) == pytest.approx(np.pi / 4.0 * np.ptp(rows) * np.ptp(columns), rel=0.03)
+    assert np.ptp(rows) == pytest.approx(np.ptp(columns), rel=0.05)
+    frame = as_ints(renderer.draw(nothing)).sum(axis=2)
+    middle = int(columns.mean())
+    assert frame[rows.min() + 15, middle] > frame[rows.max() - 15, middle] + 100
+
+
+def test_a_shape_moves_with_the_pin_that_carries_it():
+    for model, view in ((shapes_2d(), PLANE), (shapes_3d(), SPACE)):
+        renderer = Renderer(model, view, size=(128, 128))
+        x = no_goal(model)
+        without = renderer.draw(x)
+        pin = model.pins[0]
+        x[pin] = model.positions[pin]
+        there = renderer.draw(x)
+        x[pin] += 0.1
+        assert changed(there, without) > 20
+        assert changed(renderer.draw(x), there) > 20
 
 
 def test_the_plane_is_seen_upright():

@@ -9,6 +9,7 @@ from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import OrthographicCamera
 from pbd_gym.rendering.canvas import Canvas
+from pbd_gym.rendering.colliders import outline, placed
 from pbd_gym.rendering.curves import finite_rows, finite_runs, smooth_line, smooth_loop
 from pbd_gym.rendering.marks import (
     BEAD,
@@ -22,6 +23,7 @@ from pbd_gym.rendering.palette import Colour
 from pbd_gym.rendering.scene import (
     Segment,
     bob_radius,
+    grippers,
     loose_particles,
     particles_of,
     round_length,
@@ -62,6 +64,7 @@ class PlanarPainter:
         if goal is not None:
             self._paint_goals(bodies, singles, self._project(goal), goal_radius)
         pixels = self._project(x)
+        self._paint_colliders(x)
         for body in model.bodies:
             self._paint_body(body, pixels, palette.BLUE, palette.DARK_BLUE)
         visible = finite_rows(pixels)
@@ -70,9 +73,18 @@ class PlanarPainter:
             paint_bead(canvas, pixel, BEAD * canvas.unit, palette.BLUE, palette.DARK_BLUE)
         for pixel in pixels[singles[visible[singles]]]:
             paint_bead(canvas, pixel, BEAD * canvas.unit, palette.ORANGE, palette.DARK_ORANGE)
-        for pin in model.pins[visible[model.pins]]:
+        pins = grippers(model)
+        for pin in pins[visible[pins]]:
             paint_pin = paint_cart if int(pin) in self._riders else paint_gripper
             paint_pin(canvas, pixels[pin])
+
+    def _paint_colliders(self, x: np.ndarray) -> None:
+        reach = 2.0 * max(self._canvas.size) / self.camera.pixels_per_metre
+        for shape in placed(self._model, x):
+            corners = self._project(outline(shape, self.camera.centre, reach))
+            self._canvas.polygon(corners, palette.WALL)
+            rim = np.concatenate([corners, corners[:1]])
+            self._canvas.stroke(rim, 2.0 * self._canvas.unit, palette.WALL_EDGE)
 
     def _paint_goals(
         self, bodies: list[Body], singles: np.ndarray, targets: np.ndarray, goal_radius: float

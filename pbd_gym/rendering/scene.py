@@ -39,9 +39,23 @@ def split_goals(model: Model, goal: np.ndarray | None) -> tuple[list[Body], np.n
     return whole, np.flatnonzero(single)
 
 
+def carriers(model: Model) -> np.ndarray:
+    """Return the pins that carry shapes."""
+    if model.colliders is None:
+        return np.zeros(0, dtype=np.int64)
+    pins = np.unique(model.colliders.pins)
+    return pins[pins >= 0]
+
+
+def grippers(model: Model) -> np.ndarray:
+    """Return the pins that hold a body and carry no shape."""
+    return np.setdiff1d(model.pins, carriers(model))
+
+
 def loose_particles(model: Model) -> np.ndarray:
-    """Return the indices of the particles that belong to no body."""
+    """Return the indices of the particles that belong to no body and carry no shape."""
     loose = np.ones(len(model.inverse_mass), dtype=bool)
+    loose[carriers(model)] = False
     for body in model.bodies:
         loose[particles_of(body)] = False
     return np.flatnonzero(loose)

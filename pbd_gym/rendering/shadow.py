@@ -1,4 +1,4 @@
-"""Where the bodies of a model cast their shadows on the floor."""
+"""Where the bodies and shapes of a model cast their shadows on the floor."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from pbd_gym.physics.bodies import Body, Linkage, Mesh, Sheet
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering.canvas import ribbon
+from pbd_gym.rendering.colliders import cast
 from pbd_gym.rendering.curves import finite_runs
 from pbd_gym.rendering.scene import bob_radius, particles_of
 
@@ -24,10 +25,9 @@ def shadow_patches(model: Model, x: np.ndarray, light: np.ndarray) -> tuple[np.n
         (Q,) [m].
     """
     floor = float(model.room.lower[2])
-    height = np.maximum(x[:, 2] - floor, 0.0)
-    dropped = x - height[:, None] / light[2] * light
-    dropped[:, 2] = floor
-    patches, heights = [np.zeros((0, 4, 3))], [np.zeros(0)]
+    dropped, height = _drop(x, light, floor)
+    solid, above = _drop(cast(model, x, light), light, floor)
+    patches, heights = [solid], [above.mean(axis=1)]
     for body in model.bodies:
         for corners, high in _casters(model, body, dropped, height):
             patches.append(corners)
@@ -36,6 +36,14 @@ def shadow_patches(model: Model, x: np.ndarray, light: np.ndarray) -> tuple[np.n
     order = np.argsort(-high, kind="stable")
     order = order[np.isfinite(corners[order]).all(axis=(1, 2))]
     return corners[order], high[order]
+
+
+def _drop(points: np.ndarray, light: np.ndarray, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the shadows of points (..., 3) on the floor and how high they are above it [m]."""
+    height = np.maximum(points[..., 2] - floor, 0.0)
+    dropped = points - height[..., None] / light[2] * light
+    dropped[..., 2] = floor
+    return dropped, height
 
 
 def _casters(

@@ -9,6 +9,7 @@ from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import PerspectiveCamera
 from pbd_gym.rendering.canvas import Canvas
+from pbd_gym.rendering.colliders import lit, patches, placed
 from pbd_gym.rendering.curves import finite_runs, smooth_line
 from pbd_gym.rendering.display_list import DisplayList
 from pbd_gym.rendering.floor import floor_pixels
@@ -17,6 +18,7 @@ from pbd_gym.rendering.palette import Colour
 from pbd_gym.rendering.scene import (
     Segment,
     bob_radius,
+    grippers,
     loose_particles,
     particles_of,
     round_length,
@@ -54,6 +56,7 @@ class SpatialPainter:
         self._model = model
         self._canvas = canvas
         self._extent = float(np.max(view[1] - view[0]))
+        self._centre = (view[0] + view[1]) / 2.0
         self.camera = PerspectiveCamera.framing(*view, canvas.size, _MARGIN, _AZIMUTH, _ELEVATION)
         self._paint_background(view, rails)
 
@@ -80,13 +83,16 @@ class SpatialPainter:
 
     def _paint_bodies(self, x: np.ndarray, with_goal: np.ndarray) -> None:
         scene = DisplayList(self._canvas, self.camera)
+        for shape in placed(self._model, x):
+            corners = patches(shape, self._centre, 0.5 * self._extent)
+            scene.add_mesh(*lit(corners, self.camera.eye, _LIGHT, palette.LIGHT_STEEL))
         for body in self._model.bodies:
             self._add_body(scene, body, x, ghost=False)
         for point in x[loose_particles(self._model)]:
             scene.add_ball(point, 0.0, *_SOLID)
         for point in x[with_goal]:
             scene.add_ball(point, 0.0, *_GHOSTLY)
-        for point in x[self._model.pins]:
+        for point in x[grippers(self._model)]:
             scene.add_gripper(point)
         scene.draw()
 

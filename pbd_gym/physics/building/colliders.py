@@ -118,7 +118,12 @@ class ColliderBuilder(ParticleBuilder):
         self._add_shape(_BOX, (pin, pin), at, at, rows, half, surface)
 
     def add_sphere(
-        self, centre: Any, radius: float, *, pin: int | None = None, **surface: Unpack[SurfaceKeywords]
+        self,
+        centre: Any,
+        radius: float,
+        *,
+        pin: int | None = None,
+        **surface: Unpack[SurfaceKeywords],
     ) -> None:
         """Add a ball (a disc in the plane).
 
