@@ -302,3 +302,55 @@ def test_a_fingerprint_tells_models_apart_and_nothing_else():
     pinned.pin(0)
     fingerprints = {model.fingerprint for model in (base, *changed, pinned.build())}
     assert len(fingerprints) == 5
+
+
+def add_shapes(builder, **surface):
+    """A ball before the shape that is in question, so that its index is 1."""
+    builder.add_sphere((0.0, 5.0), 0.1)
+    builder.add_sphere((1.0, 5.0), 0.1, **surface)
+
+
+@pytest.mark.parametrize("value", [-0.1, NAN, INF])
+def test_properties_of_colliders_are_finite_and_not_negative(value):
+    for name in ("margin", "restitution", "friction"):
+        builder = line()
+        add_shapes(builder, **{name: value})
+        refused(builder, f"{name} of collider 1 is {value}")
+
+
+def test_kinetic_friction_is_not_above_that_of_rest():
+    builder = line()
+    add_shapes(builder, friction=0.3, kinetic_friction=0.4)
+    refused(builder, r"kinetic friction of collider 1 is 0\.4")
+    builder = line()
+    builder.set_ground(-1.0, friction=0.3, kinetic_friction=0.4)
+    refused(builder, r"kinetic friction is 0\.4")
+
+
+def test_colliders_have_a_size_and_a_place():
+    for radius in (0.0, -1.0, NAN, INF):
+        builder = line()
+        builder.add_sphere((0.0, 5.0), radius)
+        refused(builder, "size of collider 0")
+    builder = line()
+    builder.add_box((0.0, NAN), (1.0, 1.0))
+    refused(builder, "place of collider 0")
+    builder = line()
+    builder.add_plane((0.0, 0.0), (0.0, 0.0))
+    refused(builder, "normal of collider 0")
+    builder = line()
+    builder.add_box((0.0, 5.0), (1.0, 1.0), axes=[[1.0, 0.0], [0.1, 1.0]])
+    refused(builder, "axes of collider 0")
+    with pytest.raises(ValueError, match=r"axes have shape \(3, 3\)"):
+        line().add_box((0.0, 5.0), (1.0, 1.0), axes=np.eye(3))
+    with pytest.raises(ValueError, match=r"start has shape \(3,\)"):
+        line().add_sphere((0.0, 5.0, 0.0), 1.0)
+
+
+@pytest.mark.parametrize("pin", [-1, 2, 4, 2.0])
+def test_pins_carry_colliders(pin):
+    builder = line()
+    builder.pin(0)
+    builder.add_capsule((0.0, 5.0), (1.0, 5.0), 0.1, pins=(0, pin))
+    with pytest.raises((ValueError, TypeError), match="pin of colliders 1 is|particles are"):
+        builder.build()

@@ -168,7 +168,7 @@ def _put_outside(at, first, second, lane, colliders, shape, timing, force):
     for k in range(DIM):
         normal = at[NORMAL + k * LANES + lane]
         carried = _carried(at, first, second, k, lane)
-        approach -= normal * (at[VELOCITY + k * LANES + lane] - carried * timing.inverse_h)
+        approach -= normal * (at[VELOCITY + k * LANES + lane] - carried / timing.h)
         way += normal * _way(at, carried, k, lane)
     for k in range(DIM):
         carried = _carried(at, first, second, k, lane)
