@@ -352,5 +352,5 @@ def test_pins_carry_colliders(pin):
     builder = line()
     builder.pin(0)
     builder.add_capsule((0.0, 5.0), (1.0, 5.0), 0.1, pins=(0, pin))
-    with pytest.raises((ValueError, TypeError), match="pin of colliders 1 is|particles are"):
+    with pytest.raises((ValueError, TypeError), match=r"pin of colliders 1 is|particles are"):
         builder.build()
