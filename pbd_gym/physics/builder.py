@@ -9,6 +9,7 @@ import numpy as np
 from pbd_gym.physics.building.bending import BendBuilder
 from pbd_gym.physics.building.colliders import ColliderBuilder
 from pbd_gym.physics.building.contacts import ContactBuilder
+from pbd_gym.physics.building.encounters import EncounterBuilder
 from pbd_gym.physics.building.solids import SolidBuilder
 from pbd_gym.physics.building.tethers import TetherBuilder
 from pbd_gym.physics.model import Model
@@ -16,7 +17,7 @@ from pbd_gym.physics.model import Model
 INTEGRATORS = ("pbd", "rattle")
 
 
-class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder, ColliderBuilder):
+class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder, ColliderBuilder, EncounterBuilder):
     """Collects particles and what holds between them; `build` checks it all and returns a Model.
 
     Args:
@@ -81,6 +82,7 @@ class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder, Col
             room=self._room_table(),
             colliders=self._collider_table(),
             self_collision=self._self_collision_table(),
+            encounters=self._encounter_table(),
             bodies=tuple(self._bodies),
             **self._solid_tables(),
         )

@@ -16,6 +16,7 @@ from pbd_gym.physics.tables import (
     Chains,
     Colliders,
     Distances,
+    Encounters,
     Folds,
     Hinges,
     Limits,
@@ -54,6 +55,7 @@ class Model:
         room: Walls.
         colliders: Solid shapes, or None.
         self_collision: Particles that keep their distance, or None.
+        encounters: Particles that keep a distance from links of others, or None.
         bodies: What a renderer draws.
         fingerprint: SHA-256 of all but the bodies.
     """
@@ -77,6 +79,7 @@ class Model:
     room: Room
     colliders: Colliders | None
     self_collision: SelfCollision | None
+    encounters: Encounters | None
     bodies: tuple[Body, ...]
     fingerprint: str = field(init=False)
 

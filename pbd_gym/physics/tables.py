@@ -279,6 +279,28 @@ class SelfCollision(NamedTuple):
     friction: Any
 
 
+class Encounters(NamedTuple):
+    """M particles that keep a distance from links between others.
+
+    Attributes:
+        movers: (S,) all particles that occur.
+        particles: (M,) particles.
+        links: (M, 2) ends of the link; twice the same for a particle.
+        distance: (M,) that is kept [m].
+        reach: (M,) distance and half of the link's length as placed [m].
+        friction: (M,) Coulomb coefficient.
+        restitution: (M,) in [0, 1].
+    """
+
+    movers: Any
+    particles: Any
+    links: Any
+    distance: Any
+    reach: Any
+    friction: Any
+    restitution: Any
+
+
 class Parameters(NamedTuple):
     """A model as the kernels read it.
 
@@ -302,6 +324,7 @@ class Parameters(NamedTuple):
     room: Room
     colliders: Colliders | None
     self_collision: SelfCollision | None
+    encounters: Encounters | None
     second_order: bool | None
     iterations: int
 

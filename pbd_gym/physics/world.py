@@ -9,6 +9,7 @@ import numpy as np
 from pbd_gym.physics import compiling
 from pbd_gym.physics.model import Model
 from pbd_gym.physics.recording import copy_of_forces, recorded_forces, scratch_of_forces
+from pbd_gym.physics.scratch import allocate
 from pbd_gym.physics.snapshot import Snapshot
 from pbd_gym.physics.tables import Forces, Parameters, as_read
 from pbd_gym.physics.targets import check_targets
@@ -20,8 +21,6 @@ _FEWEST_FOR_LANES = 8
 _BATCH_LANES = 32
 # Below this many particles in all worlds, waking a second thread costs more than it brings.
 _FEWEST_PARTICLES_FOR_THREADS = 4096
-# Candidate pairs of self-collision that a world can hold, per particle.
-_PAIRS_PER_PARTICLE = 24
 
 
 class World:
@@ -82,21 +81,13 @@ class World:
         self._kernels = compiling.load_kernels(model.dim, self.lanes)
         self._parameters = as_read(_parameters(model), self.dtype)
         self._driven = np.concatenate([model.pins, model.grabbable])
-        self._scratch = [self._allocate() for _ in range(self.num_threads)]
+        width = self._kernels.WIDTH
+        self._scratch = [
+            allocate(model, self.lanes, width, self.dtype) for _ in range(self.num_threads)
+        ]
         self._substeps_used = np.zeros(self.num_worlds, dtype=np.int64)
         self._settings: tuple[Any, ...] = ()
         self.forces: Forces | None = None
-
-    def _allocate(self) -> tuple[Any, ...]:
-        """Return the scratch of one thread: work, and that of self-collision or None."""
-        shape = (self.model.num_particles + 3, self._kernels.WIDTH)
-        work = np.zeros(shape, dtype=self.dtype)
-        if self.model.self_collision is None:
-            return work, None
-        colliding = len(self.model.self_collision.particles)
-        pairs = np.zeros((self.lanes, _PAIRS_PER_PARTICLE * colliding, 3), dtype=np.int32)
-        counts = np.zeros(self.lanes, dtype=np.int64)
-        return work, (pairs, counts, np.zeros((1, self.lanes), dtype=self.dtype))
 
     def __getstate__(self) -> dict[str, Any]:
         kept = ("model", "num_worlds", "dtype", "num_threads", "lanes", "_x", "_v", "_grabbed")
@@ -250,7 +241,7 @@ class World:
     def _compile(self, substeps: int, adaptive: bool, record: bool) -> None:
         """Compile on a world of its own, so that the first real step is like any other."""
         model = self.model
-        kinds = ("colliders", "self_collision", "ropes", "limits", "rods", "hinges", "folds")
+        kinds = ("colliders", "self_collision", "encounters", "ropes", "limits", "rods", "hinges", "folds")
         present = [kind for kind in kinds if getattr(model, kind) is not None]
         extras = {
             "solids": model.volumes is not None,
@@ -318,6 +309,7 @@ def _parameters(model: Model) -> Parameters:
         room=model.room,
         colliders=model.colliders,
         self_collision=model.self_collision,
+        encounters=model.encounters,
         second_order=True if model.integrator == "rattle" else None,
         iterations=model.iterations,
     )

@@ -6,6 +6,7 @@ from .chain import project_chain_velocities, project_chains, project_chains_from
 from .collider import collide_with_shapes
 from .collision import collide_with_self, find_pairs, rub_against_self
 from .contact import collide_with_walls, read_velocities
+from .encounter import collide_with_others, list_encounters
 from .fallback import (
     has_failed,
     is_too_fast,
@@ -39,7 +40,7 @@ __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
 
 @kernel
-def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, timing, substeps):
+def advance(x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, model, timing, substeps):
     """Advance the worlds of tiles[0] <= tile < tiles[1] by one control step, in place.
 
     Args:
@@ -50,6 +51,7 @@ def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, t
         worlds: Those worlds that are advanced, in the order of the lanes, or None for all.
         work: Scratch (N + 3, WIDTH); the last row is zero.
         found: Scratch of self-collision (see `find_pairs`), or None.
+        listed: Scratch of encounters (see `list_encounters`), or None.
         grabbed: Which particles are grabbed, (W, G), or None if none can be.
         forces: Scratch for multipliers and where the forces go, or None if nobody asks.
         model: The Parameters. A table that is None is known when compiling: each function that
@@ -58,13 +60,15 @@ def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, t
         substeps: Number of substeps.
     """
     x, v, targets, worlds, work = borrowed((x, v, targets, worlds, work))
-    found, grabbed, forces, model = borrowed((found, grabbed, forces, model))
+    found, listed, grabbed, forces = borrowed((found, listed, grabbed, forces))
+    model = borrowed(model)
     masses = model.particles
     for tile in range(tiles[0], tiles[1]):
         for attempt in range(2):
             load(x, v, tile, worlds, work, masses, grabbed)
             aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
             find_pairs(work, masses, model.self_collision, found, timing.dt)
+            list_encounters(work, model.encounters, listed, timing)
             for substep in range(substeps):
                 remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
                 forget_forces(forces)
@@ -72,6 +76,7 @@ def advance(x, v, targets, tiles, worlds, work, found, grabbed, forces, model, t
                 move_pins(x, targets, tile, worlds, work, masses, remaining)
                 _project(work, model, found, timing, model.iterations, model.second_order, forces)
                 _project_again(work, model, found, timing, model.second_order, forces)
+                collide_with_others(work, masses, model.encounters, listed, timing)
                 collide_with_shapes(work, masses, model.colliders, timing, forces)
                 collide_with_walls(work, masses, model.room, forces)
                 limit_strains(work, masses, model.chains, forces)

@@ -1,0 +1,46 @@
+"""What the kernels of one thread work in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pbd_gym.physics.model import Model
+
+# Candidate pairs of self-collision that a world can hold, per particle.
+_PAIRS_PER_PARTICLE = 24
+# Candidate encounters that a world can hold, per particle that can meet another.
+_ENCOUNTERS_PER_PARTICLE = 64
+
+
+def allocate(model: Model, lanes: int, width: int, dtype: np.dtype) -> tuple[Any, ...]:
+    """Return the rows of the particles, and lists of what may collide in a control step or None.
+
+    Args:
+        model: Of the worlds.
+        lanes: Worlds side by side.
+        width: Of a row.
+        dtype: Of the worlds.
+    """
+    work = np.zeros((model.num_particles + 3, width), dtype=dtype)
+    return work, _pairs(model, lanes, dtype), _encounters(model, lanes, dtype)
+
+
+def _pairs(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, ...] | None:
+    """Return scratch of self-collision, see `find_pairs`."""
+    if model.self_collision is None:
+        return None
+    capacity = _PAIRS_PER_PARTICLE * len(model.self_collision.particles)
+    pairs = np.zeros((lanes, capacity, 3), dtype=np.int32)
+    return pairs, np.zeros(lanes, dtype=np.int64), np.zeros((1, lanes), dtype=dtype)
+
+
+def _encounters(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, ...] | None:
+    """Return scratch of encounters, see `list_encounters`."""
+    table = model.encounters
+    if table is None:
+        return None
+    capacity = min(len(table.particles), _ENCOUNTERS_PER_PARTICLE * len(table.movers))
+    indices = np.zeros((lanes, capacity), dtype=np.int32)
+    return indices, np.zeros(lanes, dtype=np.int64), np.zeros((2, lanes), dtype=dtype)
