@@ -17,7 +17,9 @@ from pbd_gym.physics.model import Model
 INTEGRATORS = ("pbd", "rattle")
 
 
-class ModelBuilder(TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder, ColliderBuilder, EncounterBuilder):
+class ModelBuilder(
+    TetherBuilder, BendBuilder, SolidBuilder, ContactBuilder, ColliderBuilder, EncounterBuilder
+):
     """Collects particles and what holds between them; `build` checks it all and returns a Model.
 
     Args:

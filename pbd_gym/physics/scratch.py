@@ -42,5 +42,6 @@ def _encounters(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, 
     if table is None:
         return None
     capacity = min(len(table.particles), _ENCOUNTERS_PER_PARTICLE * len(table.movers))
-    indices = np.zeros((lanes, capacity), dtype=np.int32)
-    return indices, np.zeros(lanes, dtype=np.int64), np.zeros((2, lanes), dtype=dtype)
+    indices = np.zeros((lanes, capacity, 2), dtype=np.int32)
+    speeds = np.zeros((lanes, capacity), dtype=dtype)
+    return indices, np.zeros(lanes, dtype=np.int64), speeds, np.zeros((2, lanes), dtype=dtype)

@@ -241,7 +241,16 @@ class World:
     def _compile(self, substeps: int, adaptive: bool, record: bool) -> None:
         """Compile on a world of its own, so that the first real step is like any other."""
         model = self.model
-        kinds = ("colliders", "self_collision", "encounters", "ropes", "limits", "rods", "hinges", "folds")
+        kinds = (
+            "colliders",
+            "self_collision",
+            "encounters",
+            "ropes",
+            "limits",
+            "rods",
+            "hinges",
+            "folds",
+        )
         present = [kind for kind in kinds if getattr(model, kind) is not None]
         extras = {
             "solids": model.volumes is not None,

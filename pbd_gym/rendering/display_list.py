@@ -32,13 +32,16 @@ class DisplayList:
         # Depth [m], function and arguments.
         self._items: list[tuple[float, Callable[..., Any], tuple[Any, ...]]] = []
 
-    def add_mesh(self, patches: np.ndarray, colours: np.ndarray) -> None:
-        """Add polygons with K corners each (Q, K, 3) [m], in colours (Q, 3)."""
+    def add_mesh(self, patches: np.ndarray, colours: np.ndarray, behind: float = 0.0) -> None:
+        """Add polygons with K corners each (Q, K, 3) [m], in colours (Q, 3).
+
+        They hide only what lies deeper by more than `behind` [m].
+        """
         pixels, depth = self._camera.project(patches.reshape(-1, 3))
         corners = pixels.reshape(*patches.shape[:2], 2)
         depth = depth.reshape(patches.shape[:2]).mean(axis=1)
         seen = np.isfinite(corners).all(axis=(1, 2))
-        self._add_polygons(corners[seen], depth[seen], colours[seen])
+        self._add_polygons(corners[seen], depth[seen] + behind, colours[seen])
 
     def add_line(self, points: np.ndarray, radius: float, fill: Colour, edge: Colour) -> None:
         """Add a round line through points (M, 3) [m] of a radius [m], with a dark edge."""

@@ -85,7 +85,9 @@ class SpatialPainter:
         scene = DisplayList(self._canvas, self.camera)
         for shape in placed(self._model, x):
             corners = patches(shape, self._centre, 0.5 * self._extent)
-            scene.add_mesh(*lit(corners, self.camera.eye, _LIGHT, palette.LIGHT_STEEL))
+            # what lies upon a shape may be drawn in patches that reach below it
+            edge = float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1).max())
+            scene.add_mesh(*lit(corners, self.camera.eye, _LIGHT, palette.LIGHT_STEEL), edge)
         for body in self._model.bodies:
             self._add_body(scene, body, x, ghost=False)
         for point in x[loose_particles(self._model)]:

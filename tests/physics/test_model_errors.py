@@ -354,3 +354,44 @@ def test_pins_carry_colliders(pin):
     builder.add_capsule((0.0, 5.0), (1.0, 5.0), 0.1, pins=(0, pin))
     with pytest.raises((ValueError, TypeError), match=r"pin of colliders 1 is|particles are"):
         builder.build()
+
+
+def test_bodies_that_collide_are_made_of_particles_that_exist():
+    builder = line()
+    builder.add_collision([0, 1], 0.1)
+    builder.add_collision([2, 4], 0.1)
+    refused(builder, "particle of collision 1, 1 is 4; particles are numbered 0 to 3")
+    builder = line()
+    builder.add_collision([0, 1], 0.1, links=[[0, 1], [1, 1]])
+    refused(builder, r"link of collision 0, 1 is \[1 1\]")
+    builder = line()
+    builder.add_collision([0, 1], 0.1, links=[[1, 2]])
+    refused(builder, "collision 0 links particle 2, which is not of the body")
+
+
+def test_a_particle_collides_as_part_of_one_body():
+    builder = line()
+    builder.add_collision([0, 1], 0.1)
+    builder.add_collision([1, 2], 0.1)
+    refused(builder, "particle 1 is named twice")
+    builder = line()
+    builder.add_collision([0, 1, 0], 0.1)
+    refused(builder, "particle 0 is named twice")
+
+
+@pytest.mark.parametrize("value", [-0.1, NAN, INF])
+def test_properties_of_collisions_are_finite_and_not_negative(value):
+    builder = line()
+    builder.add_collision([0, 1], value)
+    refused(builder, f"radius of collision 0 is {value}")
+    for name in ("friction", "restitution"):
+        builder = line()
+        builder.add_collision([0, 1], 0.1)
+        builder.add_collision([2, 3], 0.1, **{name: value})
+        refused(builder, f"{name} of collision 1 is {value}")
+
+
+def test_one_body_alone_collides_with_nothing():
+    builder = line()
+    builder.add_collision([0, 1], 0.1)
+    assert builder.build().encounters is None

@@ -51,8 +51,24 @@ def creased():
     return builder.build(iterations=2)
 
 
+def collisions():
+    """Balls and a rope that collide with each other and with shapes, some of which are carried."""
+    builder = ModelBuilder(2)
+    rope = shapes.rope(builder, (-0.5, 0.2), (0.5, 0.2), 12, mass=0.2)
+    links = np.stack([rope[:-1], rope[1:]], axis=1)
+    builder.add_collision(rope, 0.01, links=links, within=True, friction=0.3)
+    balls = builder.add_particles([(0.1 * i, 0.26 + 0.02 * i) for i in range(-4, 5)], 0.1)
+    builder.add_collision(balls, 0.04, within=True, friction=0.3, restitution=0.5)
+    ends = builder.add_particles([(-0.2, 0.1), (0.2, 0.0)], 1.0, pinned=True)
+    builder.add_capsule((-0.2, 0.1), (0.2, 0.0), 0.03, pins=(ends[0], ends[1]), friction=0.4)
+    builder.add_box((0.5, 0.0), (0.1, 0.1), axes=[[0.8, 0.6], [-0.6, 0.8]], restitution=0.5)
+    builder.add_sphere((-0.5, 0.0), 0.1, pin=ends[0], margin=0.01)
+    builder.add_plane((0.0, 0.12), (0.1, 1.0), friction=0.2)
+    return builder.build()
+
+
 # constraints of which lanes alone are compared, as every other number of lanes is compiled anew
-FURTHER = {"lines": lines, "creased": creased}
+FURTHER = {"lines": lines, "creased": creased, "collisions": collisions}
 
 
 def run(name, num_worlds, *, dtype=np.float32, **keywords):

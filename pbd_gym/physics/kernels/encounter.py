@@ -11,25 +11,28 @@ substep, world by world, in the order in which they were listed.
 import numpy as np
 
 from ..compiling import kernel, row
-from .layout import DIM, LANES, POSITION, START, VELOCITY
+from .layout import DIM, LANES, NORMAL, POSITION, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
 # Speed at which what overlaps is let apart [m/s].
-_PARTING_SPEED = 0.1
+_PARTING_SPEED = 1.0
 # Speeds may grow within a control step, as light things are hit by heavy ones.
 _SPEED_UP = 2.0
+# How an encounter touches.
+_APART, _RESTS, _BOUNCES = 0, 1, 2
 
 
 @kernel
 def list_encounters(work, encounters, listed, timing):
     """List, for every lane, the encounters that can come about within the control step.
 
-    listed: their indices (LANES, capacity), their number (LANES,) and scratch (2, LANES). What
-    exceeds the capacity is left out.
+    listed: their indices and how they touch (LANES, capacity, 2), their number (LANES,), speeds at
+    which they may part (LANES, capacity) [m/s], and scratch (2, LANES). What exceeds the capacity
+    is left out.
     """
     if encounters is None:
         return
-    indices, counts, scratch = listed
+    indices, counts, _, scratch = listed
     travel, beyond = row(scratch, 0), row(scratch, 1)
     _measure_travel(work, encounters.movers, travel, timing.dt, timing.gravity)
     for lane in range(LANES):
@@ -40,7 +43,7 @@ def list_encounters(work, encounters, listed, timing):
         if _can_meet(c, a, b, encounters.reach[index], travel, beyond):
             for lane in range(LANES):
                 if beyond[lane] < 0 and counts[lane] < indices.shape[1]:
-                    indices[lane, counts[lane]] = index
+                    indices[lane, counts[lane], 0] = index
                     counts[lane] += 1
 
 
@@ -78,32 +81,80 @@ def _can_meet(c, a, b, reach, travel, beyond):
 
 
 @kernel
-def collide_with_others(work, masses, encounters, listed, timing):
-    """Push apart what is listed and too close, with friction and restitution.
+def collide_with_others(work, masses, encounters, listed, timing, sweep):
+    """Push apart what is listed and too close, with friction, and note how it touches.
 
     What began the substep too close is let apart at `_PARTING_SPEED` only (Macklin et al. 2019, eq.
     10): pushed out at once, it would fly apart at depth/h.
     """
     if encounters is None:
         return
-    indices, counts, _ = listed
+    indices, counts, speeds, _ = listed
+    parting = work.dtype.type(_PARTING_SPEED) * timing.h
     for lane in range(LANES):
         for entry in range(counts[lane]):
-            index = indices[lane, entry]
-            particle = encounters.particles[index]
-            first, second = encounters.links[index, 0], encounters.links[index, 1]
-            c, a, b = row(work, particle), row(work, first), row(work, second)
+            index = indices[lane, entry, 0]
+            if sweep == 0:
+                indices[lane, entry, 1] = _APART
+            c, a, b = _rows(work, encounters, index)
             t = _nearest(c, a, b, lane)
-            weights = (
-                in_lane(inverse_mass_of(masses, particle), c, lane),
-                in_lane(inverse_mass_of(masses, first), a, lane) * (1 - t),
-                in_lane(inverse_mass_of(masses, second), b, lane) * t,
-            )
-            total = weights[0] + weights[1] * (1 - t) + weights[2] * t
-            square = _square(c, a, b, POSITION, t, lane)
+            weights = _weights(masses, encounters, index, c, a, b, t, lane)
             distance = encounters.distance[index]
-            if square < distance * distance and total > 0:
-                _push_apart(c, a, b, lane, t, square, weights, total, encounters, index, timing)
+            if _length(c, a, b, POSITION, t, lane) < distance and weights[3] > 0:
+                before = _length(c, a, b, START, t, lane)
+                target = min(distance, before + parting)
+                depth = target - _measure(c, a, b, t, lane)
+                if indices[lane, entry, 1] == _APART:
+                    touch, speed = _meet(c, a, b, lane, t, encounters, index, timing)
+                    indices[lane, entry, 1], speeds[lane, entry] = touch, speed
+                _push_apart(c, a, b, lane, t, weights, depth, encounters.friction[index])
+
+
+@kernel
+def part_from_others(work, masses, encounters, listed):
+    """Give what touches the velocity at which it parts (Mueller et al. 2020, eq. 34).
+
+    What bounces has that of restitution. What does not may not part faster than it did before it
+    was pushed: a heap would hop for ever.
+    """
+    if encounters is None:
+        return
+    indices, counts, speeds, _ = listed
+    for lane in range(LANES):
+        for entry in range(counts[lane]):
+            touch = indices[lane, entry, 1]
+            if touch == _APART:
+                continue
+            index, speed = indices[lane, entry, 0], speeds[lane, entry]
+            c, a, b = _rows(work, encounters, index)
+            t = _nearest(c, a, b, lane)
+            weights = _weights(masses, encounters, index, c, a, b, t, lane)
+            _measure(c, a, b, t, lane)
+            parting = speed * 0
+            for k in range(DIM):
+                parting += _normal(c, k, lane) * _apart(c, a, b, VELOCITY, t, k, lane)
+            if touch == _BOUNCES or parting > speed:
+                for k in range(DIM):
+                    change = (speed - parting) / weights[3] * _normal(c, k, lane)
+                    _move(c, a, b, VELOCITY + k * LANES + lane, weights, change)
+
+
+@kernel
+def _rows(work, encounters, index):
+    """Return the rows of the particle and of the link's ends."""
+    links = encounters.links
+    c = row(work, encounters.particles[index])
+    return c, row(work, links[index, 0]), row(work, links[index, 1])
+
+
+@kernel
+def _weights(masses, encounters, index, c, a, b, t, lane):
+    """Return by how much an impulse along n moves the three, and how far it parts them."""
+    links = encounters.links
+    w_c = in_lane(inverse_mass_of(masses, encounters.particles[index]), c, lane)
+    w_a = in_lane(inverse_mass_of(masses, links[index, 0]), a, lane) * (1 - t)
+    w_b = in_lane(inverse_mass_of(masses, links[index, 1]), b, lane) * t
+    return w_c, w_a, w_b, w_c + w_a * (1 - t) + w_b * t
 
 
 @kernel
@@ -128,71 +179,89 @@ def _apart(c, a, b, quantity, t, k, lane):
 
 
 @kernel
-def _square(c, a, b, quantity, t, lane):
+def _length(c, a, b, quantity, t, lane):
     square = t * 0
     for k in range(DIM):
         delta = _apart(c, a, b, quantity, t, k, lane)
         square += delta * delta
-    return square
+    return np.sqrt(square)
 
 
 @kernel
-def _push_apart(c, a, b, lane, t, square, weights, total, encounters, index, timing):
-    """Solve one contact.
+def _measure(c, a, b, t, lane):
+    """Return the distance of a particle from a link and write the normal into its row.
 
-    Which side of the link is the particle's is decided by where it came from. Restitution (Mueller
-    et al. 2020, eq. 34) shifts the starts, from which velocities are read off; friction takes back
-    the sideways motion as far as the push can hold it (Macklin et al. 2014, eq. 23-24).
+    The distance is negative where the particle has passed the link within the substep. What lies on
+    one spot is parted the way it came, or along the last axis.
     """
-    real = type(timing.h)
+    real = type(c[0])
     one, zero = real(1), real(0)
-    length, before = np.sqrt(square), np.sqrt(_square(c, a, b, START, t, lane))
+    now, before = _length(c, a, b, POSITION, t, lane), _length(c, a, b, START, t, lane)
     aligned = zero
     for k in range(DIM):
-        now = _apart(c, a, b, POSITION, t, k, lane)
-        aligned += now * _apart(c, a, b, START, t, k, lane)
+        start = _apart(c, a, b, START, t, k, lane)
+        aligned += start * _apart(c, a, b, POSITION, t, k, lane)
     side = -one if aligned < zero else one
-    target = min(encounters.distance[index], before + real(_PARTING_SPEED) * timing.h)
-    depth = max(target - side * length, zero)
-    # what lies on one spot is parted along the last axis
-    scale = side / length if length > zero else zero
-    approach, way, slide_square = zero, zero, zero
     for k in range(DIM):
-        normal = _normal(c, a, b, t, k, lane, scale)
-        approach -= normal * _apart(c, a, b, VELOCITY, t, k, lane)
-        way += normal * _motion(c, a, b, t, k, lane)
-    for k in range(DIM):
-        slide = _motion(c, a, b, t, k, lane) - way * _normal(c, a, b, t, k, lane, scale)
-        slide_square += slide * slide
-    slid, held = np.sqrt(slide_square), encounters.friction[index] * depth
-    share = one if slid <= held else held / slid
-    bounces = approach > timing.rest_speed and encounters.restitution[index] > zero
-    rebound = encounters.restitution[index] * approach * timing.h
-    shift = (way + depth - rebound) / total if bounces else zero
-    for k in range(DIM):
-        normal = _normal(c, a, b, t, k, lane, scale)
-        slide = _motion(c, a, b, t, k, lane) - way * normal
-        move, start = (depth * normal - share * slide) / total, shift * normal
-        _move(c, k, lane, weights[0] * move, weights[0] * start)
-        _move(a, k, lane, -weights[1] * move, -weights[1] * start)
-        _move(b, k, lane, -weights[2] * move, -weights[2] * start)
+        normal = one if k == DIM - 1 else zero
+        if now > zero:
+            normal = side * _apart(c, a, b, POSITION, t, k, lane) / now
+        elif before > zero:
+            normal = _apart(c, a, b, START, t, k, lane) / before
+        c[NORMAL + k * LANES + lane] = normal
+    return side * now
 
 
 @kernel
-def _move(at, k, lane, move, start):
-    at[POSITION + k * LANES + lane] += move
-    at[START + k * LANES + lane] += start
-
-
-@kernel
-def _normal(c, a, b, t, k, lane, scale):
-    """Return a component of the unit vector from a link's nearest point to a particle."""
-    if scale == 0:
-        return scale + 1 if k == DIM - 1 else scale
-    return scale * _apart(c, a, b, POSITION, t, k, lane)
+def _normal(c, k, lane):
+    """Return what `_measure` has written."""
+    return c[NORMAL + k * LANES + lane]
 
 
 @kernel
 def _motion(c, a, b, t, k, lane):
     """Return how a particle moved relative to a link within the substep, along axis k [m]."""
     return _apart(c, a, b, POSITION, t, k, lane) - _apart(c, a, b, START, t, k, lane)
+
+
+@kernel
+def _meet(c, a, b, lane, t, encounters, index, timing):
+    """Return whether what meets bounces, and the speed at which it may part."""
+    restitution = encounters.restitution[index]
+    approach, way = restitution * 0, restitution * 0
+    for k in range(DIM):
+        approach -= _normal(c, k, lane) * _apart(c, a, b, VELOCITY, t, k, lane)
+        way += _normal(c, k, lane) * _motion(c, a, b, t, k, lane)
+    if approach > timing.rest_speed and restitution > 0:
+        return _BOUNCES, restitution * approach
+    return _RESTS, max(way, restitution * 0) / timing.h
+
+
+@kernel
+def _push_apart(c, a, b, lane, t, weights, depth, friction):
+    """Part a particle and a link by a depth [m].
+
+    Friction takes back the sideways motion as far as the push can hold it (Macklin et al. 2014, eq.
+    23-24).
+    """
+    push = max(depth, depth * 0)
+    way, square = depth * 0, depth * 0
+    for k in range(DIM):
+        way += _normal(c, k, lane) * _motion(c, a, b, t, k, lane)
+    for k in range(DIM):
+        slide = _motion(c, a, b, t, k, lane) - way * _normal(c, k, lane)
+        square += slide * slide
+    slid, held = np.sqrt(square), friction * push
+    share = held / slid if slid > held else push * 0 + 1
+    for k in range(DIM):
+        slide = _motion(c, a, b, t, k, lane) - way * _normal(c, k, lane)
+        move = (push * _normal(c, k, lane) - share * slide) / weights[3]
+        _move(c, a, b, POSITION + k * LANES + lane, weights, move)
+
+
+@kernel
+def _move(c, a, b, at, weights, move):
+    """Move the particle one way and the link the other, so that the momentum is kept."""
+    c[at] += weights[0] * move
+    a[at] -= weights[1] * move
+    b[at] -= weights[2] * move

@@ -19,8 +19,8 @@ PIVOT = COUPLING + LANES  # reciprocal pivot of the elimination
 MULTIPLIER = PIVOT + LANES  # right-hand side, then the link's multiplier
 SCALE = MULTIPLIER + LANES  # 1/length that turns the link into its gradient
 MASS = SCALE + LANES  # inverse mass, where it differs from lane to lane
-# Scratch of contacts with shapes, in the row of the particle, when the chains are solved:
-NORMAL = DIRECTION  # out of the shape, unit vector
+# Scratch of contacts, in the row of the particle, when the chains are solved:
+NORMAL = DIRECTION  # out of a shape or away from a link, unit vector
 GAP = COUPLING  # distance from the surface, negative inside
 SHARE = PIVOT  # how far along the shape the nearest point lies, in [0, 1]
 KEPT = MASS + LANES  # position that a failed solve must not touch

@@ -6,7 +6,7 @@ from .chain import project_chain_velocities, project_chains, project_chains_from
 from .collider import collide_with_shapes
 from .collision import collide_with_self, find_pairs, rub_against_self
 from .contact import collide_with_walls, read_velocities
-from .encounter import collide_with_others, list_encounters
+from .encounter import collide_with_others, list_encounters, part_from_others
 from .fallback import (
     has_failed,
     is_too_fast,
@@ -40,7 +40,9 @@ __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
 
 @kernel
-def advance(x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, model, timing, substeps):
+def advance(
+    x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, model, timing, substeps
+):
     """Advance the worlds of tiles[0] <= tile < tiles[1] by one control step, in place.
 
     Args:
@@ -76,7 +78,7 @@ def advance(x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, 
                 move_pins(x, targets, tile, worlds, work, masses, remaining)
                 _project(work, model, found, timing, model.iterations, model.second_order, forces)
                 _project_again(work, model, found, timing, model.second_order, forces)
-                collide_with_others(work, masses, model.encounters, listed, timing)
+                _collide_with_others(work, model, model.encounters, listed, timing, forces)
                 collide_with_shapes(work, masses, model.colliders, timing, forces)
                 collide_with_walls(work, masses, model.room, forces)
                 limit_strains(work, masses, model.chains, forces)
@@ -84,6 +86,7 @@ def advance(x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, 
                     limit_moves(work, masses, timing.speed_limit * timing.h)
                 read_velocities(work, masses, model.room, timing.h, timing.rest_speed, forces)
                 _finish(work, model, timing, model.second_order, forces)
+                part_from_others(work, masses, model.encounters, listed)
                 rub_against_self(
                     work, masses, model.self_collision, found, timing.h, timing.gravity
                 )
@@ -165,6 +168,19 @@ def _project_again(work, model, found, timing, second_order, forces):
         _project(work, model, found, timing, max(model.iterations, _AGAIN), None, forces)
         take_up_kept(work, model.particles)
         take_up_kept_forces(forces, work)
+
+
+@kernel
+def _collide_with_others(work, model, encounters, listed, timing, forces):
+    """Part what collides, what stands on the ground before what stands on that."""
+    if encounters is None:
+        return
+    masses = model.particles
+    for sweep in range(model.iterations):
+        if sweep > 0:
+            collide_with_shapes(work, masses, model.colliders, timing, forces)
+            collide_with_walls(work, masses, model.room, forces)
+        collide_with_others(work, masses, encounters, listed, timing, sweep)
 
 
 @kernel
