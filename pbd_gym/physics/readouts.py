@@ -112,16 +112,36 @@ def touches_particle(model: Model, x: np.ndarray, slack: float = 1e-3) -> np.nda
         slack: Share of the collision distance by which touching particles may be apart.
     """
     touches = np.zeros(x.shape[:2], dtype=bool)
-    if model.self_collision is None:
-        return touches
-    particles, reach = model.self_collision.particles, model.self_collision.distance * (1.0 + slack)
+    _mark_self_collisions(model, x, 1.0 + slack, touches)
+    _mark_encounters(model, x, 1.0 + slack, touches)
+    return touches
+
+
+def _mark_self_collisions(model: Model, x: np.ndarray, share: float, touches: np.ndarray) -> None:
+    table = model.self_collision
+    if table is None:
+        return
+    particles, reach = table.particles, table.distance * share
     rest = model.positions[particles]
     # neighbours in the body are held apart by its own constraints (kernels/collision.py)
-    distant = _square_distances(rest) >= (3.0 * model.self_collision.distance) ** 2
+    distant = _square_distances(rest) >= (3.0 * table.distance) ** 2
     for world, points in enumerate(x[:, particles].astype(np.float64)):
         near = distant & (_square_distances(points) <= reach**2)
-        touches[world, particles] = near.any(axis=1)
-    return touches
+        touches[world, particles] |= near.any(axis=1)
+
+
+def _mark_encounters(model: Model, x: np.ndarray, share: float, touches: np.ndarray) -> None:
+    table = model.encounters
+    if table is None:
+        return
+    for world, points in enumerate(x.astype(np.float64)):
+        c, (a, b) = points[table.particles], (points[ends] for ends in table.links.T)
+        length = np.sum((b - a) ** 2, axis=1)
+        along = np.sum((c - a) * (b - a), axis=1) / np.where(length > 0.0, length, 1.0)
+        apart = c - a - np.clip(along, 0.0, 1.0)[:, None] * (b - a)
+        near = np.sqrt(np.sum(apart**2, axis=1)) <= table.distance * share
+        touches[world, table.particles[near]] = True
+        touches[world, table.links[near]] = True
 
 
 def _masses(model: Model) -> tuple[np.ndarray, np.ndarray]:

@@ -36,6 +36,8 @@ def rope(
     payload: float = 0.0,
     slack: bool = False,
     implicit: bool = False,
+    collision_radius: float = 0.0,
+    collision_friction: float = 0.0,
     radius: float = 0.01,
 ) -> np.ndarray:
     """Add a straight rope whose links and bending are solved directly; nothing is pinned.
@@ -52,6 +54,8 @@ def rope(
         payload: Mass that its last particle carries besides [kg].
         slack: Let links be shorter than their rest: they pull but do not push.
         implicit: Stay stable with many short links and heavy masses; see `add_chain`.
+        collision_radius: With which it collides with other bodies and with itself [m]; 0 for not.
+        collision_friction: Coulomb coefficient of that.
         radius: Drawn [m].
 
     Returns:
@@ -77,6 +81,11 @@ def rope(
     )
     if bending_stiffness > 0.0:
         builder.add_rod(indices, bending_stiffness=bending_stiffness, curvature=curvature)
+    if collision_radius > 0.0:
+        links = np.stack([indices[:-1], indices[1:]], axis=1)
+        builder.add_collision(
+            indices, collision_radius, links=links, within=True, friction=collision_friction
+        )
     return indices
 
 

@@ -23,6 +23,8 @@ def soft_body_2d(
     area_modulus: float = np.inf,
     shape_stiffness: float = 0.0,
     pressure: float = 1.0,
+    collision_radius: float = 0.0,
+    collision_friction: float = 0.0,
     radius: float = 0.005,
 ) -> np.ndarray:
     """Add a soft body of the plane: an elastic outline that encloses an area; nothing is pinned.
@@ -37,6 +39,8 @@ def soft_body_2d(
             `ModelBuilder.add_shape_match`; 0 for a bag that any outline of its length may enclose,
             +inf for a rigid body.
         pressure: Rest area as a multiple of the area as placed.
+        collision_radius: Of the outline, with which it collides with other bodies [m]; 0 for not.
+        collision_friction: Coulomb coefficient of that.
         radius: Half the drawn width of the outline [m].
 
     Returns:
@@ -64,6 +68,9 @@ def soft_body_2d(
     if shape_stiffness != 0.0:
         compliance = _compliance("shape_stiffness", shape_stiffness)
         builder.add_shape_match(indices, compliance=compliance)
+    if collision_radius > 0.0:
+        links = np.stack([indices, np.roll(indices, -1)], axis=1)
+        builder.add_collision(indices, collision_radius, links=links, friction=collision_friction)
     builder.add_body(Polygon(tuple(map(int, indices)), radius))
     return indices
 

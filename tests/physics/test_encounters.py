@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scenes import GRAVITY, momenta, world
 
-from pbd_gym.physics import ModelBuilder, shapes
+from pbd_gym.physics import ModelBuilder, World, readouts, shapes
 
 RADIUS = 0.05
 FLOATING = (0.0, 0.0)
@@ -28,12 +28,11 @@ def balls(positions, *, masses=None, radius=RADIUS, gravity=FLOATING, room=None,
     return world(builder.build(gravity=gravity))
 
 
-def soft_disc(builder, centre, *, count=24, size=0.2, radius=0.02, **properties):
+def soft_disc(builder, centre, *, count=24, size=0.2, friction=0.0):
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     outline = np.array(centre) + size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    disc = shapes.soft_body_2d(builder, outline, mass=0.3, stretch_stiffness=30.0, radius=radius)
-    builder.add_collision(disc, radius, links=ring(disc), **properties)
-    return disc
+    collision = {"collision_radius": 0.02, "collision_friction": friction}
+    return shapes.soft_body_2d(builder, outline, mass=0.3, stretch_stiffness=30.0, **collision)
 
 
 def gaps(x, particles, links):
@@ -104,6 +103,8 @@ def test_a_ball_does_not_slip_between_the_particles_of_a_rope():
         assert (state.x[0, ball, 1] > 0.03 - 1e-9).all()
     np.testing.assert_allclose(state.x[0, ball, 1], 0.03, atol=1e-9)
     np.testing.assert_allclose(state.v[0], 0.0, atol=1e-9)
+    assert readouts.touches_particle(state.model, state.x).all()
+    assert not readouts.touches_particle(state.model, state.model.positions[None]).any()
 
 
 @pytest.mark.parametrize("share", [0.5, 1.5, 1.9])
@@ -185,8 +186,8 @@ def crossings(x, links):
 
 def test_a_rope_that_falls_on_itself_does_not_cross_itself():
     builder = ModelBuilder(2)
-    rope = shapes.rope(builder, (0.0, 0.1), (0.3, 1.3), 40, mass=0.2, bending_stiffness=1e-5)
-    builder.add_collision(rope, 0.01, links=row(rope), within=True, friction=0.4)
+    collision = {"collision_radius": 0.01, "collision_friction": 0.4}
+    rope = shapes.rope(builder, (0.0, 0.1), (0.3, 1.3), 40, mass=0.2, **collision)
     builder.set_ground(0.0, friction=0.6, radius=0.01)
     state = world(builder.build(damping=0.5))
     for _ in range(180):
@@ -206,3 +207,25 @@ def test_one_soft_disc_lies_on_another():
     assert state.x[0, upper, 1].mean() > state.x[0, lower, 1].mean() + 0.2
     assert gaps(state.x[0], upper, ring(lower)).min() > 0.04 - 1e-3
     assert np.linalg.norm(state.v[0], axis=1).max() < 0.05
+
+
+def test_a_rope_that_falls_on_itself_in_space_does_not_pass_through_itself():
+    radius, count = 0.01, 40  # the links are two radii long
+    builder = ModelBuilder(3)
+    collision = {"collision_radius": radius, "collision_friction": 0.4}
+    top = 0.1 + 2.0 * radius * (count - 1)
+    rope = shapes.rope(builder, (0, 0, 0.1), (0.05, 0.02, top), count, mass=0.2, **collision)
+    builder.set_ground(0.0, friction=0.5, radius=radius)
+    state = World(builder.build(damping=0.5), lanes=1)
+    share = np.linspace(0.0, 1.0, 7)[:, None]
+    for step in range(300):
+        state.step(1 / 60, 16)
+        if step % 20 == 19:
+            x = state.x[0, rope].astype(np.float64)
+            points = x[:-1, None] + share * np.diff(x, axis=0)[:, None]
+            apart = np.linalg.norm(points[:, None, :, None] - points[None, :, None], axis=-1)
+            apart = apart.min(axis=(2, 3))[np.triu_indices(count - 1, 5)]
+            # links that cross in their middles, with all four ends at 2 r from the other link, are
+            # sqrt(3) r apart; a few g h^2 = 1e-5 m less where the heap presses
+            assert apart.min() > np.sqrt(3.0) * radius - 1e-4
+    assert np.linalg.norm(state.v, axis=2).max() < 0.01
