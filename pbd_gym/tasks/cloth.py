@@ -16,6 +16,8 @@ from pbd_gym.tasks.rewards import closeness
 
 _PI = 3.141592653589793
 # Distance that particles keep from the table [m].
+# Friction of the cloth with itself; where it sticks more, a heap can hardly be drawn flat.
+_CLOTH_ON_CLOTH = 0.1
 _TABLE_GAP = 0.005
 # Pins are held at most this share of the cloth's side apart: a taut edge would fight with gravity.
 _SPAN = 0.97
@@ -83,7 +85,8 @@ class Cloth(Task):
     stretch_compliance: float = number(1e-4, 0.0, 1.0, "m/N")
     shear_compliance: float = number(0.1, 0.0, 1e3, "m/N")
     bending_compliance: float = number(10.0, 0.0, 1e6, "m/N")
-    thread_damping: float = number(20.0, 0.0, 1e3, "1/s")
+    bending_friction: float = number(0.003, 0.0, 1e3, "N")
+    thread_damping: float = number(0.0, 0.0, 1e3, "1/s")
     friction: float = number(0.5, 0.0, 10.0)
     substeps: int = number(16, 1, 1000)
     max_speed: float = number(1.0, 1e-3, 100.0, "m/s")
@@ -106,10 +109,11 @@ class Cloth(Task):
             stretch_compliance=self.stretch_compliance,
             shear_compliance=self.shear_compliance,
             bending_compliance=self.bending_compliance,
+            bending_friction=self.bending_friction,
             thread_damping=self.thread_damping,
             strain_limit=0.01,
             collision_distance=0.7 * spacing,
-            collision_friction=self.friction,
+            collision_friction=_CLOTH_ON_CLOTH,
         )
         builder.pin([grid[0, 0], grid[0, -1]])
         builder.set_ground(0.0, friction=self.friction, radius=_TABLE_GAP)
