@@ -7,21 +7,24 @@ directly solved link, lowest particle above a wall, greatest observation.
 from __future__ import annotations
 
 import argparse
+from typing import cast
 
 import gymnasium
 import numpy as np
 from tqdm import trange
 
-import pbd_gym  # noqa: F401  registers the environments
+import pbd_gym
+from pbd_gym.envs import PBDVectorEnv
 
+gymnasium.register_envs(pbd_gym)
 IDS = [name for name in gymnasium.registry if name.startswith("PBD")]
 
 
 def endure(name: str, steps: int, worlds: int, seed: int) -> str:
     """Step one environment with random actions and return its row."""
     env = gymnasium.make_vec(name, num_envs=worlds, vectorization_mode="vector_entry_point")
-    face = env.unwrapped
-    model = face.task.model  # type: ignore[attr-defined]
+    face = cast(PBDVectorEnv, env.unwrapped)
+    model = face.task.model
     pairs, rest = model.links()
     generator = np.random.default_rng(seed)
     env.reset(seed=seed)
@@ -30,7 +33,7 @@ def endure(name: str, steps: int, worlds: int, seed: int) -> str:
     for _ in trange(-(-steps // worlds), desc=name, leave=False):
         actions = generator.uniform(-1.0, 1.0, env.action_space.shape).astype(np.float32)
         observation, _, terminated, _, _ = env.step(actions)
-        x = face.get_state().worlds.x  # type: ignore[attr-defined]
+        x = face.get_state().worlds.x
         ends = x[:, pairs].astype(np.float64)
         strain = np.sqrt(((ends[:, :, 0] - ends[:, :, 1]) ** 2).sum(axis=2)) / rest - 1.0
         stretch, compression = max(stretch, strain.max()), min(compression, strain.min())

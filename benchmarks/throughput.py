@@ -25,9 +25,10 @@ from machine import describe_machine
 from report import draw_figure, markdown
 from start_up import measure_start_up
 
-import pbd_gym  # noqa: F401  (registers the ids)
+import pbd_gym
 from pbd_gym.physics import World
 
+gymnasium.register_envs(pbd_gym)
 RESULTS = Path(__file__).parent / "results"
 WORLDS = (1, 64, 1024, 4096)
 THREADS = (1, 2)

@@ -16,16 +16,17 @@ def make_task(task: str | type[Task], arguments: dict[str, Any]) -> Task:
         TypeError: For a keyword that the task does not know, or a value of another kind.
         ValueError: For a value out of range, or a place that holds no task.
     """
+    kind: Any = task
     if isinstance(task, str):
         module, _, name = task.partition(":")
-        task = getattr(importlib.import_module(module), name, None)  # type: ignore[assignment]
-    if not (isinstance(task, type) and issubclass(task, Task)):
+        kind = getattr(importlib.import_module(module), name, None)
+    if not (isinstance(kind, type) and issubclass(kind, Task)):
         raise ValueError(f"task is {task!r}; expected a Task class or its place 'module:Class'")
-    known = [spec.name for spec in dataclasses.fields(task)]
+    known = [spec.name for spec in dataclasses.fields(kind)]
     for name in arguments:
         if name not in known:
-            raise TypeError(f"{task.__name__} has no keyword {name!r}; allowed: {', '.join(known)}")
-    return task(**arguments)
+            raise TypeError(f"{kind.__name__} has no keyword {name!r}; allowed: {', '.join(known)}")
+    return kind(**arguments)
 
 
 def as_dict(options: dict[str, Any] | None) -> dict[str, Any]:

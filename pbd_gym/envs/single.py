@@ -27,6 +27,7 @@ class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         ValueError: For a value out of range.
     """
 
+    # Gymnasium reads it from the class, and declares it there as an attribute of instances
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 30}  # noqa: RUF012
 
     def __init__(
@@ -80,6 +81,7 @@ class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         observation = self._batch.observe()[0]
         return observation, outcome.reward.item(), outcome.terminated.item(), False, info
 
+    # Gymnasium types it with a variable that is not the one of the class
     def render(self) -> np.ndarray | None:  # type: ignore[override]
         """Return a frame (height, width, 3) uint8; in human mode show it and return None."""
         if self.render_mode is None:

@@ -37,6 +37,7 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         ValueError: For a value out of range.
     """
 
+    # Gymnasium reads it from the class, and declares it there as an attribute of instances
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
 
     def __init__(
@@ -191,6 +192,7 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         observation[worlds] = self._batch.observe(worlds)
         return infos
 
+    # Gymnasium types it with a variable that is not the one of the class
     def render(self) -> tuple[np.ndarray, ...] | None:  # type: ignore[override]
         """Return one frame per world, (height, width, 3) uint8 each; None without a render mode."""
         if self.render_mode is None:

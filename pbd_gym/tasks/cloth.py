@@ -16,8 +16,6 @@ from pbd_gym.tasks.rewards import closeness
 
 _PI = 3.141592653589793
 # Distance that particles keep from the table [m].
-# Friction of the cloth with itself; where it sticks more, a heap can hardly be drawn flat.
-_CLOTH_ON_CLOTH = 0.1
 _TABLE_GAP = 0.005
 # Pins are held at most this share of the cloth's side apart: a taut edge would fight with gravity.
 _SPAN = 0.97
@@ -87,6 +85,8 @@ class Cloth(Task):
     bending_compliance: float = number(10.0, 0.0, 1e6, "m/N")
     bending_friction: float = number(0.003, 0.0, 1e3, "N")
     thread_damping: float = number(0.0, 0.0, 1e3, "1/s")
+    # of the cloth with itself; where it sticks more, a heap can hardly be drawn flat
+    collision_friction: float = number(0.1, 0.0, 10.0)
     friction: float = number(0.5, 0.0, 10.0)
     substeps: int = number(16, 1, 1000)
     max_speed: float = number(1.0, 1e-3, 100.0, "m/s")
@@ -113,7 +113,7 @@ class Cloth(Task):
             thread_damping=self.thread_damping,
             strain_limit=0.01,
             collision_distance=0.7 * spacing,
-            collision_friction=_CLOTH_ON_CLOTH,
+            collision_friction=self.collision_friction,
         )
         builder.pin([grid[0, 0], grid[0, -1]])
         builder.set_ground(0.0, friction=self.friction, radius=_TABLE_GAP)

@@ -91,8 +91,8 @@ def greatest_gain(model, worlds):
     return gain
 
 
-# The most that was seen in 10^9 particle-steps: none in first order, 0.05 in second order, where
-# links that whip round within a substep let some in before it is solved again in first order.
+# The most seen in 3 x 10^7 steps of a particle: none in first order; 0.05 in second order, where
+# links that whip round let some in before a substep is solved again in first order.
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize(("integrator", "bound"), [("pbd", 1e-3), ("rattle", 0.1)])
 @_abuse
