@@ -8,8 +8,8 @@ from pbd_gym.physics.bodies import Linkage, Mesh, Polygon, Sheet, Strand
 from pbd_gym.physics.builder import ModelBuilder
 from pbd_gym.physics.frames import frame_targets
 from pbd_gym.physics.model import Model
+from pbd_gym.physics.parameters import Forces
 from pbd_gym.physics.snapshot import Snapshot
-from pbd_gym.physics.tables import Forces
 from pbd_gym.physics.timestep import Adaptive
 from pbd_gym.physics.world import World
 

@@ -158,7 +158,9 @@ def cache_folder() -> Path | None:
     """
     digest = hashlib.sha256()
     # what every package may call or be compiled for
-    shared = [Path(__file__).with_name(name) for name in ("tables.py", "portable.py")]
+    shared = [
+        Path(__file__).with_name(name) for name in ("parameters.py", "tables.py", "portable.py")
+    ]
     for source in (*sorted(_KERNELS.glob("*.py")), *shared):
         digest.update(source.read_bytes())
     target = (

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pbd_gym.physics.model import Model
-from pbd_gym.physics.tables import Forces, entries_of_links
+from pbd_gym.physics.parameters import Forces
+from pbd_gym.physics.tables import entries_of_links
 
 
 def scratch_of_forces(model: Model, lanes: int, dtype: np.dtype) -> Forces:

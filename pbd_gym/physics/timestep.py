@@ -10,7 +10,7 @@ import numpy as np
 from pbd_gym.physics import portable
 from pbd_gym.physics.compiling import kernel
 from pbd_gym.physics.model import Model
-from pbd_gym.physics.tables import Timing, as_read
+from pbd_gym.physics.parameters import Timing, as_read
 
 # No particle is ever faster; what a failed solve throws about comes back [m/s].
 _SPEED_LIMIT = 1000.0

@@ -8,10 +8,10 @@ import numpy as np
 
 from pbd_gym.physics import compiling
 from pbd_gym.physics.model import Model
+from pbd_gym.physics.parameters import Forces, Parameters, as_read
 from pbd_gym.physics.recording import copy_of_forces, recorded_forces, scratch_of_forces
 from pbd_gym.physics.scratch import allocate
 from pbd_gym.physics.snapshot import Snapshot
-from pbd_gym.physics.tables import Forces, Parameters, as_read
 from pbd_gym.physics.targets import check_targets
 from pbd_gym.physics.threads import cores, pool
 from pbd_gym.physics.timestep import Adaptive, count_substeps, is_whole, timing_of

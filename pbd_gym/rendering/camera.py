@@ -3,29 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-
-
-class Camera(Protocol):
-    """Projects points of the world on the picture."""
-
-    def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Project points.
-
-        Args:
-            points: (M, dim) [m].
-
-        Returns:
-            Pixels (M, 2), x to the right and y down, and the depth of each point (M,) [m]. What
-            cannot be seen, because it is not finite or not in front of the camera, has NaN pixels.
-        """
-        ...
-
-    def scale(self, depth: float) -> float:
-        """Return the pixels per metre at a depth [m]."""
-        ...
 
 
 @dataclass(frozen=True)
