@@ -91,8 +91,12 @@ def test_the_table_of_environments_is_of_today(id):
     assert [cell.strip() for cell in row.split("|")][3:7] == described(id)
 
 
-def test_the_speeds_are_those_of_the_committed_results():
-    table = re.search(r"<!-- speed -->\n(.*?)\n<!-- /speed -->", README, re.DOTALL)
-    results = (ROOT / "benchmarks/results/throughput.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize(
+    ("page", "mark", "results"),
+    [("README.md", "speed", "throughput.md"), ("docs/physics.md", "accuracy", "accuracy.md")],
+)
+def test_tables_are_those_of_the_committed_results(page, mark, results):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    table = re.search(rf"<!-- {mark} -->\n(.*?)\n<!-- /{mark} -->", text, re.DOTALL)
     assert table is not None
-    assert table[1] in results
+    assert table[1] in (ROOT / "benchmarks/results" / results).read_text(encoding="utf-8")
