@@ -99,4 +99,4 @@ def test_tables_are_those_of_the_committed_results(page, mark, results):
     text = (ROOT / page).read_text(encoding="utf-8")
     table = re.search(rf"<!-- {mark} -->\n(.*?)\n<!-- /{mark} -->", text, re.DOTALL)
     assert table is not None
-    assert table[1] in (ROOT / "benchmarks/results" / results).read_text(encoding="utf-8")
+    assert table[1].strip() in (ROOT / "benchmarks/results" / results).read_text(encoding="utf-8")
