@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from pbd_gym.physics.building.tethers import TetherBuilder
 from pbd_gym.physics.model import Model
 
 INTEGRATORS = ("pbd", "rattle")
+KINDS = ("colliders", "encounters", "grabs", "solids")
 
 
 class ModelBuilder(
@@ -33,6 +35,7 @@ class ModelBuilder(
         damping: float = 0.0,
         integrator: str = "pbd",
         iterations: int = 1,
+        kinds: Collection[str] = (),
     ) -> Model:
         """Check everything that was added and return the Model.
 
@@ -42,6 +45,9 @@ class ModelBuilder(
             integrator: "pbd" or "rattle", see below.
             iterations: Projections of rigid constraints in a substep. A compliant constraint
                 receives its force in the first and keeps it.
+            kinds: Of "colliders", "encounters", "grabs" and "solids", those to compile for even if
+                the model has none. Kernels are compiled for the kinds that a model has; models that
+                are edited share one variant if all of them name the kinds that may come.
 
         "pbd" is the seed's scheme (Mueller et al. 2007): positions are predicted, projected along
         the current direction of each constraint, and velocities read off, v = (x - x_start)/h.
@@ -64,8 +70,8 @@ class ModelBuilder(
         if gravity is None:
             gravity = np.zeros(self.dim)
             gravity[-1] = -9.81
-        particles = self._particle_table(np.array(gravity, dtype=np.float64))
-        _check_settings(damping, integrator, iterations)
+        particles = self._particle_table(np.array(gravity, dtype=np.float64), "grabs" in kinds)
+        _check_settings(damping, integrator, iterations, kinds)
         chains, ropes = self._chain_tables()
         return Model(
             dim=self.dim,
@@ -82,15 +88,17 @@ class ModelBuilder(
             hinges=self._hinge_table(),
             folds=self._fold_table(),
             room=self._room_table(),
-            colliders=self._collider_table(),
+            colliders=self._collider_table("colliders" in kinds),
             self_collision=self._self_collision_table(),
-            encounters=self._encounter_table(),
+            encounters=self._encounter_table("encounters" in kinds),
             bodies=tuple(self._bodies),
-            **self._solid_tables(),
+            **self._solid_tables("solids" in kinds),
         )
 
 
-def _check_settings(damping: float, integrator: str, iterations: int) -> None:
+def _check_settings(
+    damping: float, integrator: str, iterations: int, kinds: Collection[str]
+) -> None:
     if not (np.isfinite(damping) and damping >= 0.0):
         raise ValueError(f"damping is {damping}; a rate must be finite and at least 0 [1/s]")
     if integrator not in INTEGRATORS:
@@ -98,3 +106,6 @@ def _check_settings(damping: float, integrator: str, iterations: int) -> None:
     whole = isinstance(iterations, int | np.integer) and not isinstance(iterations, bool)
     if not whole or iterations < 1:
         raise ValueError(f"iterations is {iterations!r}; expected a whole number from 1 up")
+    for kind in kinds:
+        if kind not in KINDS:
+            raise ValueError(f"kind {kind!r} is unknown; allowed: {', '.join(KINDS)}")

@@ -212,7 +212,7 @@ class World:
         count = self.num_worlds if worlds is None else len(worlds)
         tiles = -(-count // self.lanes)
         bounds = np.linspace(0, tiles, self.num_threads + 1).astype(np.int64)
-        grabbed = self._grabbed if len(self.model.grabbable) else None
+        grabbed = None if self.model.particles.grabbable is None else self._grabbed
         return [
             (bounds[i : i + 2].copy(), worlds, *scratch, grabbed, forces, self._parameters)
             for i, (scratch, forces) in enumerate(zip(self._scratch, self._noted, strict=True))
@@ -254,7 +254,7 @@ class World:
         present = [kind for kind in kinds if getattr(model, kind) is not None]
         extras = {
             "solids": model.volumes is not None,
-            "grabs": len(model.grabbable) > 0,
+            "grabs": model.particles.grabbable is not None,
             "adaptive": adaptive,
             "forces": record,
         }

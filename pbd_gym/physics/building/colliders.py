@@ -183,20 +183,23 @@ class ColliderBuilder(ParticleBuilder):
             raise ValueError(f"{name} has shape {point.shape}; expected {(self.dim,)}")
         return point
 
-    def _collider_table(self) -> Colliders | None:
+    def _collider_table(self, always: bool) -> Colliders | None:
         shapes = self._shapes
-        if not shapes:
+        if not shapes and not always:
             return None
+        row = (len(shapes), self.dim)
         pins = self._carriers()
         offsets = np.array([*self._positions, np.zeros(self.dim)])  # the last of what is static
-        surfaces = np.array([shape.surface for shape in shapes])
+        surfaces = np.array([shape.surface for shape in shapes]).reshape(-1, len(_Surface._fields))
         table = Colliders(
             kinds=np.array([shape.kind for shape in shapes], dtype=np.int64),
             pins=pins,
-            starts=np.array([shape.start for shape in shapes]) - offsets[pins[:, 0]],
-            ends=np.array([shape.end for shape in shapes]) - offsets[pins[:, 1]],
-            axes=np.array([shape.axes.ravel() for shape in shapes]),
-            sizes=np.array([shape.size for shape in shapes]),
+            starts=np.reshape([shape.start for shape in shapes], row) - offsets[pins[:, 0]],
+            ends=np.reshape([shape.end for shape in shapes], row) - offsets[pins[:, 1]],
+            axes=np.reshape([shape.axes for shape in shapes], (len(shapes), self.dim**2)).astype(
+                float
+            ),
+            sizes=np.reshape([shape.size for shape in shapes], row).astype(float),
             margin=surfaces[:, 0].copy(),
             restitution=surfaces[:, 1].copy(),
             friction=surfaces[:, 2].copy(),
@@ -213,7 +216,7 @@ class ColliderBuilder(ParticleBuilder):
         wrong = ~np.array(self._pinned, dtype=bool)[pins]
         refuse_if(wrong, "pin of colliders", pins, "a particle that carries one must be pinned")
         carriers = [[-1 if pin is None else pin for pin in shape.pins] for shape in self._shapes]
-        return np.array(carriers, dtype=np.int64)
+        return np.array(carriers, dtype=np.int64).reshape(-1, 2)
 
 
 def _surface(

@@ -73,13 +73,14 @@ class EncounterBuilder(ParticleBuilder):
         numbers = float(radius), bool(within), float(friction), float(restitution)
         self._groups.append(_Group(members, pairs, *numbers))
 
-    def _encounter_table(self) -> Encounters | None:
+    def _encounter_table(self, always: bool) -> Encounters | None:
         groups = self._groups
-        if not groups:
+        if not groups and not always:
             return None
         for index, group in enumerate(groups):
             _check(group, index, self._count)
-        movers = np.concatenate([group.particles for group in groups])
+        members = [group.particles for group in groups]
+        movers = np.concatenate([np.zeros(0, np.int64), *members])
         unique, counts = np.unique(movers, return_counts=True)
         if (counts > 1).any():
             raise ValueError(
@@ -89,7 +90,7 @@ class EncounterBuilder(ParticleBuilder):
         parts = [self._within(group) for group in groups if group.within]
         parts += [_between(*pair) for pair in combinations(groups, 2)]
         rows = np.concatenate([np.zeros((0, 6)), *parts])
-        if not len(rows):
+        if not len(rows) and not always:
             return None
         if len(rows) > _MOST:
             raise ValueError(f"there are {len(rows)} possible encounters; allowed: {_MOST}")

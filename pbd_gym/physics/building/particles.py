@@ -29,7 +29,7 @@ class ParticleBuilder:
         self._positions: list[np.ndarray] = []
         self._masses: list[float] = []
         self._pinned: list[bool] = []
-        self._grabbable: list[int] = []
+        self._grabbable: dict[int, None] = {}  # in the order in which they were named
         self._bodies: list[Body] = []
 
     def add_particles(self, positions: Any, mass: float, *, pinned: bool = False) -> np.ndarray:
@@ -79,7 +79,7 @@ class ParticleBuilder:
                 raise ValueError(f"cannot grab particle {particle}: there are {len(self._pinned)}")
             if particle in self._grabbable:
                 raise ValueError(f"particle {particle} is grabbable already")
-            self._grabbable.append(int(particle))
+            self._grabbable[int(particle)] = None
 
     def add_body(self, body: Body) -> None:
         """Tell a renderer what to draw."""
@@ -90,7 +90,7 @@ class ParticleBuilder:
         """Number of particles so far."""
         return len(self._positions)
 
-    def _particle_table(self, gravity: np.ndarray) -> Particles:
+    def _particle_table(self, gravity: np.ndarray, always_grabs: bool) -> Particles:
         positions = np.array(self._positions, dtype=np.float64).reshape(-1, self.dim)
         masses = np.array(self._masses, dtype=np.float64)
         pinned = np.array(self._pinned, dtype=bool)
@@ -105,14 +105,14 @@ class ParticleBuilder:
         if gravity.shape != (self.dim,) or not np.isfinite(gravity).all():
             raise ValueError(f"gravity is {gravity}; expected {self.dim} finite numbers [m/s2]")
         inverse_mass = 1.0 / np.where(pinned, np.inf, masses)
-        return Particles(
-            positions, inverse_mass, np.flatnonzero(pinned), self._grabbable_table(pinned), gravity
-        )
+        grabbable = self._grabbable_table(pinned)
+        grabs = grabbable if always_grabs or len(grabbable) else None
+        return Particles(positions, inverse_mass, np.flatnonzero(pinned), grabs, gravity)
 
-    def _grabbable_table(self, pinned: np.ndarray) -> np.ndarray | None:
-        grabbable = np.array(self._grabbable, dtype=np.int64)
+    def _grabbable_table(self, pinned: np.ndarray) -> np.ndarray:
+        grabbable = np.array(list(self._grabbable), dtype=np.int64)
         refuse_if(pinned[grabbable], "grabbable particle", grabbable, "it is pinned for good")
-        return grabbable if len(grabbable) else None
+        return grabbable
 
     def _length(self, i: int, j: int) -> float:
         """Distance of two particles as placed [m]; NaN where one does not exist (build refuses)."""

@@ -124,13 +124,13 @@ class SolidBuilder(ParticleBuilder):
         """
         self._attachments.append((int(particle), int(anchor), offset, float(compliance)))
 
-    def _solid_tables(self) -> dict[str, Any]:
+    def _solid_tables(self, always: bool) -> dict[str, Any]:
         """Return all tables of solids, or None for each: so kernels exist with and without solids.
 
         A kernel for each combination of kinds would be compiled anew.
         """
         kinds = ("volumes", "shape_matches", "attachments")
-        if not (self._volumes or self._shape_matches or self._attachments):
+        if not (always or self._volumes or self._shape_matches or self._attachments):
             return dict.fromkeys(kinds)
         tables = self._volume_table(), self._shape_match_table(), self._attachment_table()
         return dict(zip(kinds, tables, strict=True))
