@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from pbd_gym.physics import Linkage, ModelBuilder, shapes
+from pbd_gym.physics import Balls, Linkage, ModelBuilder, Net, shapes
 from pbd_gym.rendering import Renderer
 from pbd_gym.rendering.camera import OrthographicCamera, PerspectiveCamera
 from pbd_gym.rendering.curves import smooth_line, smooth_sheet
@@ -70,6 +70,18 @@ def bodies_3d():
     return builder.build()
 
 
+def nets_and_balls(dim):
+    builder = ModelBuilder(dim)
+    side = np.linspace(-0.4, 0.0, 4)
+    places = [(x, *[0.0] * (dim - 2), y + 0.5) for x in side for y in side]
+    grid = builder.add_particles(places, 0.1).reshape(4, 4)
+    builder.add_body(Net(tuple(map(tuple, [*grid.tolist(), *grid.T.tolist()])), 0.005))
+    balls = builder.add_particles([(x, *[0.0] * (dim - 2), 0.3) for x in (0.2, 0.4)], 0.1)
+    builder.add_body(Balls(tuple(balls.tolist()), 0.08))
+    builder.set_ground(0.0)
+    return builder.build()
+
+
 def shapes_2d():
     builder = ModelBuilder(2)
     shapes.rope(builder, (-0.4, 0.9), (0.9, 0.9), ROPE, mass=0.2)
@@ -101,6 +113,8 @@ SCENES = {
     "rope and pendulum in space": (mixed(), SPACE),
     "bodies": (bodies_2d(), PLANE),
     "bodies in space": (bodies_3d(), SPACE),
+    "nets and balls": (nets_and_balls(2), PLANE),
+    "nets and balls in space": (nets_and_balls(3), SPACE),
     "shapes": (shapes_2d(), PLANE),
     "shapes in space": (shapes_3d(), SPACE),
 }
@@ -456,3 +470,26 @@ def test_drawing_needs_no_display_and_leaves_the_environment_alone():
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout == ""  # nor does pygame greet anybody
+
+
+@every_scene
+def test_a_picture_drawn_on_a_surface_is_the_picture(model, view):
+    pygame = pytest.importorskip("pygame")
+    renderer = Renderer(model, view, size=(160, 128))
+    surface = pygame.Surface((160, 128))
+    for shift in (0.3, 0.0):  # what moved leaves no trace
+        renderer.draw_on(surface, model.positions + shift)
+    shown = pygame.surfarray.array3d(surface).transpose(1, 0, 2)
+    assert (shown == renderer.draw(model.positions)).all()
+    with pytest.raises(ValueError, match="surface has size"):
+        renderer.draw_on(pygame.Surface((64, 64)), model.positions)
+
+
+@every_scene
+def test_what_is_seen_at_a_pixel_and_its_depth_is_the_point_that_was_projected(model, view):
+    renderer = Renderer(model, view, size=(160, 128))
+    pixels, depths = renderer.project(model.positions)
+    inside = (pixels > 0).all(axis=1) & (pixels < (160, 128)).all(axis=1)
+    assert inside.any()
+    points = renderer.unproject(pixels, depths)
+    np.testing.assert_allclose(points, model.positions, atol=1e-12)  # rounding alone

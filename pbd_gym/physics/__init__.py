@@ -4,7 +4,7 @@
 """
 
 from pbd_gym.physics import shapes
-from pbd_gym.physics.bodies import Linkage, Mesh, Polygon, Sheet, Strand
+from pbd_gym.physics.bodies import Balls, Linkage, Mesh, Net, Polygon, Sheet, Strand
 from pbd_gym.physics.builder import ModelBuilder
 from pbd_gym.physics.frames import frame_targets
 from pbd_gym.physics.model import Model
@@ -15,11 +15,13 @@ from pbd_gym.physics.world import World
 
 __all__ = [
     "Adaptive",
+    "Balls",
     "Forces",
     "Linkage",
     "Mesh",
     "Model",
     "ModelBuilder",
+    "Net",
     "Polygon",
     "Sheet",
     "Snapshot",

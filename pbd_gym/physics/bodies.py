@@ -53,4 +53,28 @@ class Mesh:
         return tuple(sorted({particle for triangle in self.triangles for particle in triangle}))
 
 
-Body = Strand | Linkage | Sheet | Polygon | Mesh
+@dataclass(frozen=True)
+class Net:
+    """Thin straight lines: a fabric of the plane, a truss, what is left of a cut cloth.
+
+    Particle indices of each line in order, and its radius [m].
+    """
+
+    threads: tuple[tuple[int, ...], ...]
+    radius: float
+
+    @property
+    def particles(self) -> tuple[int, ...]:
+        """Particle indices of the lines, each once."""
+        return tuple(sorted({particle for thread in self.threads for particle in thread}))
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Separate balls of one radius [m]: particle indices."""
+
+    particles: tuple[int, ...]
+    radius: float
+
+
+Body = Strand | Linkage | Sheet | Polygon | Mesh | Net | Balls

@@ -42,8 +42,8 @@ class OrthographicCamera:
         offset = (points - self.centre) * (self.pixels_per_metre, -self.pixels_per_metre)
         return self.middle + offset, np.zeros(len(points))
 
-    def unproject(self, pixels: np.ndarray) -> np.ndarray:
-        """Return the points of the plane (M, 2) [m] that are seen at pixels (M, 2)."""
+    def unproject(self, pixels: np.ndarray, depth: np.ndarray | None = None) -> np.ndarray:
+        """Return the points (M, 2) [m] that are seen at pixels (M, 2), whatever the depth."""
         offset = (pixels - self.middle) / (self.pixels_per_metre, -self.pixels_per_metre)
         return self.centre + offset
 
@@ -117,6 +117,12 @@ class PerspectiveCamera:
         in_front = np.where(depth > self.nearest, depth, np.nan)
         slopes = local[:, :2] / in_front[:, None]
         return self.middle + slopes * (self.focal_length, -self.focal_length), depth
+
+    def unproject(self, pixels: np.ndarray, depth: np.ndarray) -> np.ndarray:
+        """Return the points (M, 3) [m] that are seen at pixels (M, 2) at depths (M,) [m]."""
+        slopes = (pixels - self.middle) / (self.focal_length, -self.focal_length)
+        local = np.column_stack([slopes, np.ones(len(pixels))]) * depth[:, None]
+        return self.eye + local @ self.axes
 
     def scale(self, depth: float) -> float:
         """Return the pixels per metre at a depth [m]."""

@@ -29,6 +29,13 @@ def paint_bead(
     canvas.disc(centre - 0.3 * radius, 0.22 * radius, mix(fill, PAPER, 0.45))
 
 
+def paint_beads(
+    canvas: Canvas, centres: np.ndarray, radius: float, fill: Colour, edge: Colour
+) -> None:
+    """Draw the same bead around many points (M, 2)."""
+    canvas.repeat(centres, radius, lambda centre: paint_bead(canvas, centre, radius, fill, edge))
+
+
 def paint_target(canvas: Canvas, centre: np.ndarray, radius: float) -> None:
     """Draw the disc (2,) in which a particle counts as arrived, never too small to see."""
     size = max(radius, 6.0 * canvas.unit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.bodies import Body, Linkage, Mesh, Polygon, Sheet
+from pbd_gym.physics.bodies import Balls, Body, Linkage, Mesh, Net, Polygon, Sheet, Strand
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import OrthographicCamera
@@ -15,6 +15,7 @@ from pbd_gym.rendering.marks import (
     BEAD,
     GHOST,
     paint_bead,
+    paint_beads,
     paint_cart,
     paint_gripper,
     paint_target,
@@ -28,6 +29,7 @@ from pbd_gym.rendering.scene import (
     particles_of,
     round_length,
     split_goals,
+    threads_of,
 )
 
 _MARGIN = 0.05
@@ -54,6 +56,7 @@ class PlanarPainter:
         self._model = model
         self._canvas = canvas
         self.camera = OrthographicCamera.framing(*view, canvas.size, _MARGIN)
+        self._loose, self._pins = loose_particles(model), grippers(model)
         self._riders = {i for b in model.bodies if isinstance(b, Linkage) for i in b.particles}
         self._paint_background(rails)
 
@@ -68,13 +71,11 @@ class PlanarPainter:
         for body in model.bodies:
             self._paint_body(body, pixels, palette.BLUE, palette.DARK_BLUE)
         visible = finite_rows(pixels)
-        loose = loose_particles(model)
-        for pixel in pixels[loose[visible[loose]]]:
-            paint_bead(canvas, pixel, BEAD * canvas.unit, palette.BLUE, palette.DARK_BLUE)
+        loose = pixels[self._loose[visible[self._loose]]]
+        paint_beads(canvas, loose, BEAD * canvas.unit, palette.BLUE, palette.DARK_BLUE)
         for pixel in pixels[singles[visible[singles]]]:
             paint_bead(canvas, pixel, BEAD * canvas.unit, palette.ORANGE, palette.DARK_ORANGE)
-        pins = grippers(model)
-        for pin in pins[visible[pins]]:
+        for pin in self._pins[visible[self._pins]]:
             paint_pin = paint_cart if int(pin) in self._riders else paint_gripper
             paint_pin(canvas, pixels[pin])
 
@@ -116,15 +117,26 @@ class PlanarPainter:
     def _paint_body(self, body: Body, pixels: np.ndarray, fill: Colour, edge: Colour) -> None:
         if isinstance(body, Linkage):
             self._paint_linkage(body, pixels, fill, edge)
-            return
-        if isinstance(body, Polygon):
+        elif isinstance(body, Net):
+            runs = [run for t in threads_of(body) for run in finite_runs(pixels[t])]
+            width = max(2.0 * body.radius * self.camera.pixels_per_metre, self._canvas.unit)
+            self._canvas.polylines([run for run in runs if len(run) > 1], width, edge)
+        elif isinstance(body, Balls):
+            points = pixels[particles_of(body)]
+            radius = max(body.radius * self.camera.pixels_per_metre, self._canvas.unit)
+            paint_beads(self._canvas, points[finite_rows(points)], radius, fill, edge)
+        elif isinstance(body, Polygon):
             self._paint_polygon(body, pixels, fill, edge)
-            return
-        if isinstance(body, Mesh):
+        elif isinstance(body, Mesh):
             for triangle in body.triangles:
                 outline = Polygon(triangle, 0.0, smooth=False)
                 self._paint_polygon(outline, pixels, fill, edge)
-            return
+        else:
+            self._paint_lines(body, pixels, fill, edge)
+
+    def _paint_lines(
+        self, body: Strand | Sheet, pixels: np.ndarray, fill: Colour, edge: Colour
+    ) -> None:
         particles = particles_of(body)
         width = self._width(body.radius)
         # A planar sheet is seen edge-on by nobody: its threads are drawn.

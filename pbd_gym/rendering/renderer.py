@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from pbd_gym.rendering.canvas import Canvas
 from pbd_gym.rendering.planar import PlanarPainter
 from pbd_gym.rendering.scene import Segment
 from pbd_gym.rendering.spatial import SpatialPainter
+
+if TYPE_CHECKING:
+    import pygame
 
 MIN_SIZE = 32  # [pixels]; nothing can be told apart on less
 
@@ -71,17 +74,51 @@ class Renderer:
         Raises:
             ValueError: If a shape does not fit the model or the radius is negative or not finite.
         """
+        return self._paint(x, goal, goal_radius).frame()
+
+    def draw_on(self, surface: pygame.Surface, x: Any) -> None:
+        """Draw one state on a pygame surface of the renderer's size: faster than `draw`.
+
+        Args:
+            surface: Of any format.
+            x: Positions (N, dim) [m].
+
+        Raises:
+            ValueError: If a shape does not fit.
+        """
+        if surface.get_size() != self.size:
+            raise ValueError(f"surface has size {surface.get_size()}; the picture has {self.size}")
+        self._paint(x, None, 0.0).show_on(surface)
+
+    def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where points (M, dim) [m] are seen: pixels (M, 2), and their depths (M,) [m]."""
+        canvas, painter = self._ready()
+        pixels, depths = painter.camera.project(points)
+        return pixels * (self.size[0] / canvas.size[0]), depths
+
+    def unproject(self, pixels: np.ndarray, depths: np.ndarray) -> np.ndarray:
+        """Return the points (M, dim) [m] that are seen at pixels (M, 2), at depths (M,) [m]."""
+        canvas, painter = self._ready()
+        return painter.camera.unproject(pixels * (canvas.size[0] / self.size[0]), depths)
+
+    def _paint(self, x: Any, goal: Any, goal_radius: float) -> Canvas:
+        """Draw one state on the canvas."""
         points = self._visible("x", x)
         targets = None if goal is None else self._visible("goal", goal)
         if not (np.isfinite(goal_radius) and goal_radius >= 0.0):
             raise ValueError(f"goal_radius is {goal_radius!r}; it must be finite and at least 0")
+        canvas, painter = self._ready()
+        canvas.clear()
+        painter.paint(points, targets, float(goal_radius))
+        return canvas
+
+    def _ready(self) -> tuple[Canvas, PlanarPainter | SpatialPainter]:
+        """Return canvas and painter, made when first needed."""
         if self._canvas is None or self._painter is None:
             self._canvas = Canvas(self.size)
             painter = PlanarPainter if self.model.dim == 2 else SpatialPainter
             self._painter = painter(self.model, self._view, self._canvas, self._rails)
-        self._canvas.clear()
-        self._painter.paint(points, targets, float(goal_radius))
-        return self._canvas.frame()
+        return self._canvas, self._painter
 
     def _visible(self, name: str, points: Any) -> np.ndarray:
         """Return points as float64, NaN for those that no picture can show."""

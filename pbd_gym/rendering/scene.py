@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
-from pbd_gym.physics.bodies import Body, Linkage
+from pbd_gym.physics.bodies import Body, Linkage, Net
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering.curves import finite_rows
 
@@ -18,6 +19,12 @@ _BOB_DENSITY = 500.0  # [kg/m3]; a bob is drawn as a wooden ball of its mass
 def particles_of(body: Body) -> np.ndarray:
     """Return the particle indices of a body: (M,), or (rows, columns) of a sheet."""
     return np.array(body.particles, dtype=np.int64)
+
+
+@lru_cache(maxsize=64)
+def threads_of(net: Net) -> tuple[np.ndarray, ...]:
+    """Return the particle indices of each line of a net, (M,)."""
+    return tuple(np.array(thread, dtype=np.int64) for thread in net.threads)
 
 
 def split_goals(model: Model, goal: np.ndarray | None) -> tuple[list[Body], np.ndarray]:

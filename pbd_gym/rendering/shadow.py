@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.bodies import Body, Linkage, Mesh, Sheet
+from pbd_gym.physics.bodies import Balls, Body, Linkage, Mesh, Net, Sheet, Strand
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering.canvas import ribbon
 from pbd_gym.rendering.colliders import cast
@@ -50,6 +50,12 @@ def _casters(
     model: Model, body: Body, dropped: np.ndarray, height: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return patches and heights of one body, given each particle's shadow and height."""
+    if isinstance(body, Net):
+        return [
+            caster
+            for thread in body.threads
+            for caster in _casters(model, Strand(thread, body.radius), dropped, height)
+        ]
     particles = particles_of(body)
     if isinstance(body, Sheet):
         cells = np.stack(
@@ -59,6 +65,8 @@ def _casters(
     if isinstance(body, Mesh):
         corners = np.array(body.triangles)[:, [0, 1, 2, 2]]
         return [(dropped[corners], height[corners].mean(axis=1))]
+    if isinstance(body, Balls):
+        return [_under_ball(dropped[p], float(height[p]), body.radius) for p in particles]
     casters = []
     for run in finite_runs(np.column_stack([dropped[particles], height[particles]])):
         flat = ribbon(run[:, :2], 2.0 * body.radius)
@@ -66,9 +74,13 @@ def _casters(
         high = (run[1:, 3] + run[:-1, 3]) / 2.0
         casters.append((np.concatenate([flat, floor], axis=2), high))
     if isinstance(body, Linkage):
-        # Two crossed squares pass for a disc once they are blurred.
-        angles = np.radians([[0, 90, 180, 270], [45, 135, 225, 315]])
-        rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=2)
-        for particle, radius in zip(particles, bob_radius(model, body), strict=True):
-            casters.append((dropped[particle] + radius * rim, np.full(2, height[particle])))
+        bobs = zip(particles, bob_radius(model, body), strict=True)
+        casters += [_under_ball(dropped[p], float(height[p]), radius) for p, radius in bobs]
     return casters
+
+
+def _under_ball(dropped: np.ndarray, height: float, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return two crossed squares, which pass for a disc once they are blurred."""
+    angles = np.radians([[0, 90, 180, 270], [45, 135, 225, 315]])
+    rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=2)
+    return dropped + radius * rim, np.full(2, height)

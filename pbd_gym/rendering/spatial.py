@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbd_gym.physics.bodies import Body, Linkage, Mesh, Polygon, Sheet
+from pbd_gym.physics.bodies import Balls, Body, Linkage, Mesh, Net, Polygon, Sheet, Strand
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import PerspectiveCamera
@@ -23,9 +23,12 @@ from pbd_gym.rendering.scene import (
     particles_of,
     round_length,
     split_goals,
+    threads_of,
 )
 from pbd_gym.rendering.shadow import shadow_patches
 from pbd_gym.rendering.weave import shade, weave
+
+Tones = tuple[Colour, Colour]  # of a body and of its edge or inside
 
 _MARGIN = 0.03
 _AZIMUTH, _ELEVATION = float(np.radians(-62.0)), float(np.radians(32.0))
@@ -100,30 +103,46 @@ class SpatialPainter:
 
     def _add_body(self, scene: DisplayList, body: Body, x: np.ndarray, *, ghost: bool) -> None:
         """Add a body at positions (N, 3) [m], or the ghost that shows where it shall go."""
-        points = x[particles_of(body)]
         fill, edge = _GHOSTLY if ghost else _SOLID
         if isinstance(body, Sheet):
+            points = x[particles_of(body)]
             pieces = 1 if ghost else max(1, round(_PATCHES / max(points.shape[:2])))
             sides = (fill, fill) if ghost else (palette.PALE_BLUE, palette.CLOTH_BLUE)
             scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides))
-            return
-        if isinstance(body, Mesh):
+        elif isinstance(body, Mesh):
             self._add_surface(scene, body, x, (fill, edge))
-            return
-        if isinstance(body, Linkage):
-            for run in finite_runs(points):
-                scene.add_line(run, body.radius, palette.STEEL, palette.DARK_STEEL)
-            for point, radius in zip(points, bob_radius(self._model, body), strict=True):
-                if radius > 0.0:
-                    scene.add_ball(point, radius, fill, edge)
-            return
-        closed = points[:1] if isinstance(body, Polygon) else points[:0]
-        for run in finite_runs(np.concatenate([points, closed])):
-            scene.add_line(smooth_line(run, 3), body.radius, fill, edge)
+        elif isinstance(body, Linkage):
+            self._add_linkage(scene, body, x, (fill, edge))
+        elif isinstance(body, Balls):
+            for point in x[particles_of(body)]:
+                scene.add_ball(point, body.radius, fill, edge)
+        else:
+            self._add_lines(scene, body, x, (fill, edge))
 
-    def _add_surface(
-        self, scene: DisplayList, body: Mesh, x: np.ndarray, sides: tuple[Colour, Colour]
+    def _add_lines(
+        self, scene: DisplayList, body: Strand | Polygon | Net, x: np.ndarray, tones: Tones
     ) -> None:
+        """Add lines through particles; those of a net are straight."""
+        if isinstance(body, Net):
+            runs = [run for thread in threads_of(body) for run in finite_runs(x[thread])]
+        else:
+            points = x[particles_of(body)]
+            closed = points[:1] if isinstance(body, Polygon) else points[:0]
+            around = finite_runs(np.concatenate([points, closed]))
+            runs = [smooth_line(run, 3) for run in around]
+        for run in runs:
+            scene.add_line(run, body.radius, *tones)
+
+    def _add_linkage(self, scene: DisplayList, body: Linkage, x: np.ndarray, tones: Tones) -> None:
+        """Add rods and the bobs between them."""
+        points = x[particles_of(body)]
+        for run in finite_runs(points):
+            scene.add_line(run, body.radius, palette.STEEL, palette.DARK_STEEL)
+        for point, radius in zip(points, bob_radius(self._model, body), strict=True):
+            if radius > 0.0:
+                scene.add_ball(point, radius, *tones)
+
+    def _add_surface(self, scene: DisplayList, body: Mesh, x: np.ndarray, sides: Tones) -> None:
         """Add the triangles of a body; its inside, where one looks in, has the second colour."""
         corners = x[np.array(body.triangles)]
         corners = corners[np.isfinite(corners).all(axis=(1, 2))]
