@@ -16,14 +16,17 @@ _IDS: dict[str, tuple[int, dict[str, Any]]] = {
     "PBDTriplePendulum-v0": (500, {"task": "pbd_gym.tasks.pendulum:Pendulum", "links": 3}),
     "PBDRope-v0": (100, {"task": "pbd_gym.tasks.rope:Rope"}),
     "PBDCloth-v0": (90, {"task": "pbd_gym.tasks.cloth:Cloth"}),
+    "PBDRopeGoal-v0": (100, {"task": "pbd_gym.tasks.twins:RopeGoal"}),
+    "PBDClothGoal-v0": (90, {"task": "pbd_gym.tasks.twins:ClothGoal"}),
 }
 
 for _id, (_steps, _arguments) in _IDS.items():
     if _id not in gymnasium.registry:
+        _kind = "Goal" if "Goal" in _id else ""
         gymnasium.register(
             _id,
-            entry_point="pbd_gym.envs:PBDEnv",
-            vector_entry_point="pbd_gym.envs:PBDVectorEnv",
+            entry_point=f"pbd_gym.envs:PBD{_kind}Env",
+            vector_entry_point=f"pbd_gym.envs:PBD{_kind}VectorEnv",
             max_episode_steps=_steps,
             kwargs=_arguments,
         )

@@ -63,8 +63,9 @@ def episode(env, seed, steps=None, options=None):
 def digest(env, seed=5):
     """Hash of all observations and rewards of an episode."""
     (observation, _), *steps = episode(env, seed)
-    parts = [observation, *(step[0] for step in steps), np.array([step[1] for step in steps])]
-    return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
+    observations = [flat(observation), *(flat(step[0]) for step in steps)]
+    arrays = [*observations, np.array([step[1] for step in steps])]
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
 def assert_same(a, b):
@@ -88,6 +89,16 @@ def assert_same(a, b):
         assert_same(vars(a), vars(b))
     else:
         assert a == b, (a, b)
+
+
+def parts(observation):
+    """The arrays of an observation by name, or the boxes of its space; most have only one."""
+    return dict(observation.items()) if hasattr(observation, "items") else {"": observation}
+
+
+def flat(observation):
+    """All numbers of an observation (..., size), those of its parts one after the other."""
+    return np.concatenate(list(parts(observation).values()), axis=-1)
 
 
 def nothing(env):

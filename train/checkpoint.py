@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import torch
 from files import write_atomically
+from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from pbd_gym.hyperparams import algorithm_class
@@ -66,6 +67,8 @@ def restore_model(content: dict[str, Any], algo: str, env: SB3VecEnv, device: st
     if content["replay_buffer"] is not None:
         model.replay_buffer = content["replay_buffer"]
         model.replay_buffer.device = model.device
+        if isinstance(model.replay_buffer, HerReplayBuffer):
+            model.replay_buffer.set_env(env)  # whose worlds compute rewards of replaced goals
     _worlds(model).set_state(content["worlds"])
     _set_random_state(model, content["random"])
     return model

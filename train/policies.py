@@ -1,4 +1,4 @@
-"""Policies by name: functions from observations (W, observation) to actions (W, action)."""
+"""Policies by name: functions from observations of W worlds to actions (W, action)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ import json
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
 from pbd_gym.hyperparams import algorithm_class
 
-Policy = Callable[[np.ndarray], np.ndarray]
+Policy = Callable[[Any], np.ndarray]
+
+# A HerReplayBuffer could not be made without worlds, and a model that only acts needs none.
+_NO_HINDSIGHT = {"replay_buffer_class": None, "replay_buffer_kwargs": {}}
 
 BASELINES = ("noop", "random", "scripted")
 
@@ -41,16 +46,25 @@ def make_policy(name: str, env: VectorEnv, *, seed: int = 0) -> Policy:
 def _load_model(path: Path, env: VectorEnv) -> Policy:
     if not path.is_file():
         raise FileNotFoundError(f"policy must be {', '.join(BASELINES)} or a file, got {path}")
-    model = algorithm_class(_saved_algorithm(path)).load(path, device="cpu")
+    model = algorithm_class(_saved_algorithm(path)).load(
+        path, device="cpu", custom_objects=_NO_HINDSIGHT
+    )
     for kind in ("observation", "action"):
-        ours = getattr(env, f"single_{kind}_space")
-        theirs = getattr(model, f"{kind}_space")
-        if ours.shape != theirs.shape:
+        ours = _shape(getattr(env, f"single_{kind}_space"))
+        theirs = _shape(getattr(model, f"{kind}_space"))
+        if ours != theirs:
             raise ValueError(
-                f"{path} was trained on {kind}s of shape {theirs.shape}, "
-                f"but this environment has {ours.shape}; are --env and --env-kwargs the same?"
+                f"{path} was trained on {kind}s of shape {theirs}, "
+                f"but this environment has {ours}; are --env and --env-kwargs the same?"
             )
     return lambda observation: model.predict(observation, deterministic=True)[0]
+
+
+def _shape(space: spaces.Space) -> Any:
+    """Return the shape of a box, or those of a dict's boxes by name."""
+    if isinstance(space, spaces.Dict):
+        return {name: part.shape for name, part in space.items()}
+    return space.shape
 
 
 def _saved_algorithm(path: Path) -> str:

@@ -8,12 +8,13 @@ import gymnasium
 import numpy as np
 
 from pbd_gym.envs.arguments import as_dict, make_task
+from pbd_gym.envs.observations import world_of
 from pbd_gym.envs.pictures import RENDER_MODES, Pictures
 from pbd_gym.envs.state import EpisodeState, check_state
 from pbd_gym.tasks import Batch, Task
 
 
-class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+class PBDEnv(gymnasium.Env[Any, np.ndarray]):
     """One world of a task. The time limit is Gymnasium's `TimeLimit` wrapper, as for any env.
 
     Args:
@@ -50,7 +51,7 @@ class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; options fix quantities that are drawn otherwise (see the task).
 
         Raises:
@@ -62,9 +63,9 @@ class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._begun = True
         if self.render_mode == "human":
             self.render()
-        return self._batch.observe()[0], {}
+        return world_of(self._batch.observe(), 0), {}
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance the world by one control step.
 
         Raises:
@@ -78,7 +79,7 @@ class PBDEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.render_mode == "human":
             self.render()
         info = {name: values.item() for name, values in outcome.info.items()}
-        observation = self._batch.observe()[0]
+        observation = world_of(self._batch.observe(), 0)
         return observation, outcome.reward.item(), outcome.terminated.item(), False, info
 
     # Gymnasium types it with a variable that is not the one of the class

@@ -11,12 +11,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from pbd_gym.envs.arguments import as_dict, make_task
+from pbd_gym.envs.observations import replace, world_of
 from pbd_gym.envs.pictures import Pictures
 from pbd_gym.envs.state import EpisodeState, check_state
 from pbd_gym.tasks import Batch, Task
 
 
-class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
     """n worlds of a task in one batch, with time limit and autoreset.
 
     Equal to a `SyncVectorEnv` of n single environments to the last bit, in all three autoreset
@@ -83,7 +84,7 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         *,
         seed: int | list[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes in all worlds, or in those of `options["reset_mask"]`.
 
         Args:
@@ -145,7 +146,7 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
     def step(
         self, actions: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    ) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Advance every world by one control step; begin ended episodes anew by autoreset mode.
 
         Raises:
@@ -178,18 +179,18 @@ class PBDVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             infos = _infos(outcome.info, going)
         return observation, reward, terminated, truncated, infos
 
-    def _begin_ended(self, observation: np.ndarray, info: dict[str, np.ndarray]) -> dict[str, Any]:
+    def _begin_ended(self, observation: Any, info: dict[str, np.ndarray]) -> dict[str, Any]:
         """Begin the ended episodes anew and observe them; return infos that hold how they ended."""
         ended = self._ended.copy()
         worlds = np.flatnonzero(ended)
         infos = _infos(info, ~ended)
         last = np.full(self.num_envs, None, dtype=object)
         for world in worlds:
-            last[world] = observation[world].copy()
+            last[world] = world_of(observation, world)
         infos["final_obs"], infos["_final_obs"] = last, ended.copy()
         infos["final_info"], infos["_final_info"] = _infos(info, ended), ended
         self._begin(worlds, self._generators, {})
-        observation[worlds] = self._batch.observe(worlds)
+        replace(observation, worlds, self._batch.observe(worlds))
         return infos
 
     # Gymnasium types it with a variable that is not the one of the class

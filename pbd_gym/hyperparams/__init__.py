@@ -23,7 +23,6 @@ _REFUSED = frozenset(
         "action_noise",
         "device",
         "env",
-        "replay_buffer_class",
         "rollout_buffer_class",
         "sde_sample_freq",
         "seed",
@@ -67,8 +66,9 @@ def algorithm_class(algo: str) -> type[Any]:
 def algorithm_arguments(algo: str, hyperparameters: dict[str, Any]) -> dict[str, Any]:
     """Turn settings into keyword arguments of `algorithm_class(algo)`.
 
-    Drops what sets up the training, makes schedules of strings such as "lin_0.001", and reads
-    `policy_kwargs` given as text, "dict(net_arch=[64], activation_fn=nn.ReLU)".
+    Drops what sets up the training, makes schedules of strings such as "lin_0.001", reads
+    `policy_kwargs` given as text, "dict(net_arch=[64], activation_fn=nn.ReLU)", and finds the class
+    of a replay buffer named "HerReplayBuffer".
     """
     from stable_baselines3.common.utils import LinearSchedule
 
@@ -77,8 +77,11 @@ def algorithm_arguments(algo: str, hyperparameters: dict[str, Any]) -> dict[str,
     for key in ("learning_rate", "clip_range", "clip_range_vf"):
         if isinstance(arguments.get(key), str):
             arguments[key] = LinearSchedule(_linear_start(key, arguments[key]), 0.0, 1.0)
-    if isinstance(arguments.get("policy_kwargs"), str):
-        arguments["policy_kwargs"] = _read_policy_kwargs(arguments["policy_kwargs"])
+    for key in ("policy_kwargs", "replay_buffer_kwargs"):
+        if isinstance(arguments.get(key), str):
+            arguments[key] = _read_dict(key, arguments[key])
+    if "replay_buffer_class" in arguments:
+        arguments["replay_buffer_class"] = _buffer_class(arguments["replay_buffer_class"])
     return arguments
 
 
@@ -111,7 +114,15 @@ def _linear_start(name: str, text: str) -> float:
     return value
 
 
-def _read_policy_kwargs(text: str) -> dict[str, Any]:
+def _buffer_class(name: Any) -> type[Any]:
+    from stable_baselines3 import HerReplayBuffer
+
+    if name != HerReplayBuffer.__name__:
+        raise ValueError(f"replay_buffer_class must be 'HerReplayBuffer', got {name!r}")
+    return HerReplayBuffer
+
+
+def _read_dict(name: str, text: str) -> dict[str, Any]:
     """Read "dict(key=value, ...)" of literals and torch.nn names without evaluating code."""
     from torch import nn
 
@@ -127,5 +138,5 @@ def _read_policy_kwargs(text: str) -> dict[str, Any]:
         return {str(keyword.arg): read(keyword.value) for keyword in call.keywords}
     except (SyntaxError, ValueError, AttributeError) as error:
         raise ValueError(
-            f"policy_kwargs must be a mapping or 'dict(key=literal or nn.Name, ...)', got {text!r}"
+            f"{name} must be a mapping or 'dict(key=literal or nn.Name, ...)', got {text!r}"
         ) from error

@@ -2,5 +2,6 @@
 
 from pbd_gym.tasks.base import Judgement, Start, Task, draw, number
 from pbd_gym.tasks.batch import Batch
+from pbd_gym.tasks.goals import GoalTask
 
-__all__ = ["Batch", "Judgement", "Start", "Task", "draw", "number"]
+__all__ = ["Batch", "GoalTask", "Judgement", "Start", "Task", "draw", "number"]

@@ -167,8 +167,8 @@ class Task:
         """Judge worlds by their state and the action (n, size) that led to it."""
         raise NotImplementedError
 
-    def scripted(self, observation: np.ndarray) -> np.ndarray:
-        """Return the actions (n, size) of a hand-written policy for observations (n, size)."""
+    def scripted(self, observation: Any) -> np.ndarray:
+        """Return the actions (n, size) of a hand-written policy for observations of n worlds."""
         raise NotImplementedError
 
     def goal(self, variables: Variables, world: int) -> np.ndarray | None:
@@ -179,6 +179,11 @@ class Task:
     def goal_radius(self) -> float:
         """Tolerance around a goal [m], for the picture."""
         return 0.0
+
+    @property
+    def reward_scale(self) -> float:
+        """Distance from a goal at which the reward has fallen to 1/e, where there is a goal [m]."""
+        raise NotImplementedError
 
     @property
     def rails(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:

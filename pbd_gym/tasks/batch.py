@@ -9,6 +9,7 @@ import numpy as np
 from pbd_gym.physics import Snapshot, World
 from pbd_gym.tasks.base import OBSERVATION_LIMIT, Judgement, Start, Task, Variables
 from pbd_gym.tasks.bookkeeping import clip_actions, clip_observations, find_diverged, keep_score
+from pbd_gym.tasks.goals import GoalTask
 
 
 class Outcome(NamedTuple):
@@ -190,8 +191,10 @@ class Batch:
         )
         return earned, normalized, success
 
-    def observe(self, worlds: np.ndarray | None = None) -> np.ndarray:
+    def observe(self, worlds: np.ndarray | None = None) -> Any:
         """Return observations, a fresh float32 array (n, size) within the space's bounds.
+
+        Of a goal-conditioned task it is a dict of such arrays, the goals apart.
 
         Args:
             worlds: (n,) indices of the worlds to observe; all of them if not given.
@@ -202,7 +205,11 @@ class Batch:
             variables = {name: value[worlds] for name, value in variables.items()}
         observations = self.task.observe(x, v, variables)
         clip_observations(observations, OBSERVATION_LIMIT)
-        return observations
+        if not isinstance(self.task, GoalTask):
+            return observations
+        achieved, desired = self.task.achieved(x), variables["desired_goal"].copy()
+        clip_observations(achieved, OBSERVATION_LIMIT)
+        return {"observation": observations, "achieved_goal": achieved, "desired_goal": desired}
 
     def get_state(self) -> tuple[Snapshot, Variables]:
         """Return copies of all that a continuation depends on."""

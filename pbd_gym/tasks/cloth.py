@@ -19,6 +19,8 @@ _PI = 3.141592653589793
 _TABLE_GAP = 0.005
 # Pins are held at most this share of the cloth's side apart: a taut edge would fight with gravity.
 _SPAN = 0.97
+# What the task remembers of the goal: the square's centre, the cosine and sine of its yaw.
+_SQUARE = ("goal", "goal_axis")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,7 +190,10 @@ class Cloth(Task):
     @cached_property
     def _observed(self) -> np.ndarray:
         """Indices of the observed particles."""
-        count = self.particles if self.observation == "particles" else 3
+        return self.grid_particles(self.particles if self.observation == "particles" else 3)
+
+    def grid_particles(self, count: int) -> np.ndarray:
+        """Return the particles of a grid of count x count over the cloth, row by row."""
         line = np.round(np.linspace(0, self.particles - 1, count)).astype(np.int64)
         return (line[:, None] * self.particles + line).ravel()
 
@@ -204,7 +209,7 @@ class Cloth(Task):
         """Judge by the mean distance of the particles from their places."""
         distance, reward = np.empty(len(x)), np.empty(len(x))
         goal, axis = variables["goal"], variables["goal_axis"]
-        _judge(x, goal, axis, self._square, 0.2 * self.side, distance, reward)
+        _judge(x, goal, axis, self._square, self.reward_scale, distance, reward)
         if "start_performance" in variables:
             reached = distance < -0.1 * variables["start_performance"]
         else:
@@ -213,11 +218,20 @@ class Cloth(Task):
 
     def goal(self, variables: Variables, world: int) -> np.ndarray:
         """Every particle has its place on the square."""
-        cosine, sine = variables["goal_axis"][world].astype(np.float64)
+        return self.places({name: variables[name][world : world + 1] for name in _SQUARE})[0]
+
+    @property
+    def reward_scale(self) -> float:
+        """A fifth of the cloth's side [m]."""
+        return 0.2 * self.side
+
+    def places(self, variables: Variables) -> np.ndarray:
+        """Return where the particles lie on the squares of n worlds, (n, N, 3) [m]."""
+        cosine, sine = variables["goal_axis"].T[:, :, None].astype(np.float64)
         across, along = self._square[:, 0], self._square[:, 1]
-        turned = np.stack([across * cosine - along * sine, across * sine + along * cosine], axis=1)
-        height = np.full((len(turned), 1), _TABLE_GAP)
-        return np.concatenate([turned + variables["goal"][world], height], axis=1)
+        turned = np.stack([across * cosine - along * sine, across * sine + along * cosine], axis=2)
+        height = np.full((*turned.shape[:2], 1), _TABLE_GAP)
+        return np.concatenate([turned + variables["goal"][:, None], height], axis=2)
 
     def scripted(self, observation: np.ndarray) -> np.ndarray:
         """Put the free edge down at its place, then lower the held edge while moving it back."""
@@ -232,7 +246,7 @@ class Cloth(Task):
         # the height of the grippers says how much of the cloth may already lie on the table
         height = grippers[:, :, 2].mean(axis=1)
         lying = np.sqrt(np.maximum(self.side**2 - np.minimum(height, self.side) ** 2, 0.0))
-        target = np.empty_like(grippers)
+        target = np.zeros_like(grippers)
         target[:, 0, 0], target[:, 1, 0] = -_SPAN * half, _SPAN * half
         target[:, :, 1] = (lying - half)[:, None]
         astray = np.abs(grippers - target)[:, :, :2].max(axis=(1, 2)) > 0.1

@@ -146,7 +146,7 @@ class Rope(Task):
     ) -> Judgement:
         """Judge by the distance of the free end from the goal."""
         distance, reward = np.empty(len(x)), np.empty(len(x))
-        _judge(x, variables["goal"], 0.2 * self.length, distance, reward)
+        _judge(x, variables["goal"], self.reward_scale, distance, reward)
         return Judgement(reward, distance < self.goal_radius, -distance, {"distance": distance})
 
     def goal(self, variables: Variables, world: int) -> np.ndarray:
@@ -159,6 +159,11 @@ class Rope(Task):
     def goal_radius(self) -> float:
         """Within 5 % of the rope's length the goal is met [m]."""
         return 0.05 * self.length
+
+    @property
+    def reward_scale(self) -> float:
+        """A fifth of the rope's length [m]."""
+        return 0.2 * self.length
 
     def scripted(self, observation: np.ndarray) -> np.ndarray:
         """Bring the gripper above the goal; follow the rope's middle to take the sway out."""
