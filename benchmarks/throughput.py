@@ -188,9 +188,14 @@ class Progress:
         print(f"\r\033[K{line[:100]}", end=end, file=sys.stderr, flush=True)
 
 
+def task_ids() -> list[str]:
+    """Return all ids but those of twins: their worlds are those of other tasks."""
+    return [id for id in gymnasium.registry if id.startswith("PBD") and "Goal" not in id]
+
+
 def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Read the command line."""
-    ids = [id for id in gymnasium.registry if id.startswith("PBD")]
+    ids = task_ids()
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

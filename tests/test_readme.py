@@ -75,12 +75,15 @@ def described(id):
     """Return the columns of an environment's row that can be read off it."""
     env = gymnasium.make(id)
     task = env.get_wrapper_attr("task")
-    size = env.observation_space.shape[0]
-    few = gymnasium.make(id, observation="keypoints").observation_space.shape[0]
+    few = gymnasium.make(id, observation="keypoints")
+    spaces = [one.observation_space for one in (env, few)]
+    size, least = (getattr(space, "spaces", {"observation": space}) for space in spaces)
+    sizes = [space["observation"].shape[0] for space in (size, least)]
+    goals = f", goals {size['desired_goal'].shape[0]}" if "desired_goal" in size else ""
     return [
         f"{task.model.dim}D, {task.model.num_particles} particles",
         str(env.action_space.shape[0]),
-        str(size) if few == size else f"{size} ({few})",
+        (str(sizes[0]) if sizes[0] == sizes[1] else f"{sizes[0]} ({sizes[1]})") + goals,
         f"{env.spec.max_episode_steps} steps at {task.control_rate:g} Hz",
     ]
 

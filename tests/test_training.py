@@ -18,6 +18,7 @@ from callbacks import ProgressBar
 from config import load_config
 from files import write_atomically
 from intervals import bootstrap_mean, wilson_rate
+from policies import NO_HINDSIGHT
 from rollouts import run_episodes
 from stable_baselines3 import PPO, SAC
 
@@ -73,7 +74,10 @@ def assert_same(first, second):
 
 def assert_same_run(first, second, algorithm):
     for file in ("model.zip", "best_model.zip"):
-        models = [algorithm.load(run / file, device="cpu") for run in (first, second)]
+        models = [
+            algorithm.load(run / file, device="cpu", custom_objects=NO_HINDSIGHT)
+            for run in (first, second)
+        ]
         assert models[0].num_timesteps == models[1].num_timesteps
         assert_same(models[0].get_parameters(), models[1].get_parameters())  # and optimizers
     evaluations = [np.load(run / "evaluations.npz") for run in (first, second)]
@@ -94,6 +98,16 @@ def test_an_interrupted_training_resumes_to_the_same_bits(
     assert not (broken / "evaluation.json").exists()
     assert train.main(["--resume", str(broken), "--no-video"]) == 0
     assert_same_run(straight, broken, algorithm)
+
+
+def test_a_training_from_hindsight_resumes_to_the_same_bits(tmp_path, monkeypatch):
+    straight, broken = (tmp_path / name / "PBDRopeGoal-v0-sac-0" for name in ("a", "b"))
+    goal = ["--env", "pbd_gym:PBDRopeGoal-v0", "--env-kwargs", "max_episode_steps:10"]
+    assert train.main([*small_run(straight.parent, "sac"), *goal]) == 0
+    interrupt_after(monkeypatch, steps=130)
+    assert train.main([*small_run(broken.parent, "sac"), *goal]) == 130
+    assert train.main(["--resume", str(broken), "--no-video"]) == 0
+    assert_same_run(straight, broken, SAC)
 
 
 def test_n_steps_and_n_more_are_two_n_steps(tmp_path):
@@ -160,6 +174,10 @@ def test_overwriting_replaces_a_run_but_no_other_folder(tmp_path, capsys):
         (["--hyperparameters", "use_sde:True"], "use_sde"),
         (["--hyperparameters", "learning_rate:cosine_1"], "learning_rate must be"),
         (["--hyperparameters", "policy_kwargs:dict(a=open('x'))"], "policy_kwargs must be"),
+        (
+            ["--algo", "sac", "--hyperparameters", "replay_buffer_class:Heap"],
+            "replay_buffer_class must be 'HerReplayBuffer', got 'Heap'",
+        ),
         (["--num-envs", "0"], "num_envs must be an integer of at least 1"),
         (["--total-timesteps", "-5"], "total_timesteps must be"),
         (["--eval-freq", "-1"], "eval_freq must be"),

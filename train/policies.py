@@ -17,7 +17,7 @@ from pbd_gym.hyperparams import algorithm_class
 Policy = Callable[[Any], np.ndarray]
 
 # A HerReplayBuffer could not be made without worlds, and a model that only acts needs none.
-_NO_HINDSIGHT = {"replay_buffer_class": None, "replay_buffer_kwargs": {}}
+NO_HINDSIGHT = {"replay_buffer_class": None, "replay_buffer_kwargs": {}}
 
 BASELINES = ("noop", "random", "scripted")
 
@@ -47,7 +47,7 @@ def _load_model(path: Path, env: VectorEnv) -> Policy:
     if not path.is_file():
         raise FileNotFoundError(f"policy must be {', '.join(BASELINES)} or a file, got {path}")
     model = algorithm_class(_saved_algorithm(path)).load(
-        path, device="cpu", custom_objects=_NO_HINDSIGHT
+        path, device="cpu", custom_objects=NO_HINDSIGHT
     )
     for kind in ("observation", "action"):
         ours = _shape(getattr(env, f"single_{kind}_space"))

@@ -16,14 +16,15 @@ from pbd_gym.tasks.rewards import closeness
 
 @dataclass(frozen=True, kw_only=True)
 class GoalTask(Task):
-    """Makes a task goal-conditioned, by coming before it among the bases of a class.
+    """A task whose goal is apart from the rest: `observe` leaves it out, the reward needs no more.
 
-    Goals are places of k points of the body, (n, k dim) [m] in the state's dtype. `observe` leaves
-    the goal out, and the reward depends on the goals alone, as learning from hindsight needs it
-    (M. Andrychowicz et al.: Hindsight Experience Replay, 2017). Dynamics, starts, drawing and the
-    scripted policy are those of the task.
+    Goals are places of k points of the body, (n, k dim) [m] in the state's dtype. As the reward
+    depends on them alone, transitions can be learned from as if another goal had been desired (M.
+    Andrychowicz et al.: Hindsight Experience Replay, 2017).
 
-    A subclass defines the methods that raise NotImplementedError here.
+    A twin of a task has that task and this class as its bases, in this order, as each of them sets
+    the defaults anew. It defines the methods that raise NotImplementedError here, and hands what
+    the task's `start` and `judge` return through `remember_goal` and `reward_goal`.
     """
 
     reward: str = choice("sparse", "sparse", "dense")
@@ -41,36 +42,22 @@ class GoalTask(Task):
         """Return where the points should be, (n, k dim), by what the task remembers."""
         raise NotImplementedError
 
-    def with_goal(self, observation: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """Return what the task without separate goals would observe, (n, size)."""
-        raise NotImplementedError
-
     @cached_property
     def goal_space(self) -> spaces.Box:
         """Achieved and desired goals of one world."""
         size = self.desired(self.lowest_start.variables).shape[1]
         return spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (size,), np.float32)
 
-    def start(self, quantities: dict[str, np.ndarray]) -> Start:
-        """Begin as the task does, and remember the desired goal."""
-        start = super().start(quantities)
-        start.variables["desired_goal"] = self.desired(start.variables)
-        return start
+    def remember_goal(self, start: Start) -> Start:
+        """Return the start of a task that remembers the desired goal, too."""
+        desired = self.desired(start.variables)
+        return start._replace(variables={**start.variables, "desired_goal": desired})
 
-    def judge(
-        self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
-    ) -> Judgement:
-        """Reward by the goals alone; performance and terms are those of the task."""
-        judgement = super().judge(x, v, action, variables)
+    def reward_goal(self, judgement: Judgement, x: np.ndarray, variables: Variables) -> Judgement:
+        """Return a task's judgement with the reward and success of the goals alone."""
         distance, dense = self._compare(self.achieved(x), variables["desired_goal"])
         reached = distance < self.tolerance
         return judgement._replace(reward=self._choose(reached, dense), reached=reached)
-
-    def scripted(self, observation: Any) -> np.ndarray:
-        """Act as the task's own policy on a dict of observations and desired goals, (n, ...)."""
-        return super().scripted(
-            self.with_goal(observation["observation"], observation["desired_goal"])
-        )
 
     def compute_reward(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
         """Return the rewards (...,) of goals (..., k dim)."""

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from pbd_gym.tasks.base import Variables
+from pbd_gym.tasks.base import Judgement, Start, Variables
 from pbd_gym.tasks.cloth import Cloth
 from pbd_gym.tasks.goals import GoalTask
 from pbd_gym.tasks.rope import Rope
 
 
 @dataclass(frozen=True, kw_only=True)
-class RopeGoal(GoalTask, Rope):
+class RopeGoal(Rope, GoalTask):
     """The rope with its goal apart: bring the free end to a point, with or without hindsight.
 
     ## Description
@@ -79,14 +80,25 @@ class RopeGoal(GoalTask, Rope):
         """Return gripper, and rope relative to the gripper."""
         return super().observe(x, v, variables)[:, :-2].copy()
 
-    def with_goal(self, observation: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """Append the goal relative to the gripper."""
-        gripper = observation[:, :2] + self._centre
-        return np.concatenate([observation, (desired - gripper) / self.length], axis=1)
+    def start(self, quantities: dict[str, np.ndarray]) -> Start:
+        """Begin as the rope does."""
+        return self.remember_goal(super().start(quantities))
+
+    def judge(
+        self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
+    ) -> Judgement:
+        """Reward by the goals alone; performance and terms are those of the rope."""
+        return self.reward_goal(super().judge(x, v, action, variables), x, variables)
+
+    def scripted(self, observation: Any) -> np.ndarray:
+        """Act on a dict of observations as on the rope's, which end with the goal."""
+        rope, desired = observation["observation"], observation["desired_goal"]
+        goal = (desired - rope[:, :2] - self._centre) / self.length
+        return super().scripted(np.concatenate([rope, goal], axis=1))
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClothGoal(GoalTask, Cloth):
+class ClothGoal(Cloth, GoalTask):
     """The cloth with its goal apart: bring nine of its points to their places.
 
     ## Description
@@ -158,12 +170,23 @@ class ClothGoal(GoalTask, Cloth):
         middle = {"goal": np.zeros_like(axis), "goal_axis": axis}
         return super().observe(x, v, middle)[:, :-4].copy()
 
-    def with_goal(self, observation: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """Make the positions relative to the square's centre and append the square."""
-        places = desired.reshape(-1, 9, 3)
-        centre = places[:, 4, :2]
-        axis = (places[:, 2, :2] - places[:, 0, :2]) / self.side
-        whole = np.concatenate([observation, centre, axis], axis=1)
-        positions = whole[:, : observation.shape[1] // 2].reshape(len(whole), -1, 3)
-        positions[:, :, :2] -= 2.0 * centre[:, None]
-        return whole
+    def start(self, quantities: dict[str, np.ndarray]) -> Start:
+        """Begin as the cloth does."""
+        return self.remember_goal(super().start(quantities))
+
+    def judge(
+        self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
+    ) -> Judgement:
+        """Reward by the goals alone; performance and terms are those of the cloth."""
+        return self.reward_goal(super().judge(x, v, action, variables), x, variables)
+
+    def scripted(self, observation: Any) -> np.ndarray:
+        """Act on a dict of observations as on the cloth's, which are relative to the square."""
+        cloth, desired = observation["observation"], observation["desired_goal"]
+        nine = desired.reshape(-1, 9, 3)
+        centre = nine[:, [0, 2, 6, 8]].mean(axis=1) * (1.0, 1.0, 0.0)
+        axis = (nine[:, 2] - nine[:, 0]) / self.side
+        positions, velocities = np.split(cloth, 2, axis=1)
+        relative = positions - np.tile(2.0 * centre, positions.shape[1] // 3)
+        whole = np.concatenate([relative, velocities, centre[:, :2], axis[:, :2]], axis=1)
+        return super().scripted(whole)
