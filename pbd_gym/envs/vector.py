@@ -185,7 +185,7 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         worlds = np.flatnonzero(ended)
         infos = _infos(info, ~ended)
         last = np.full(self.num_envs, None, dtype=object)
-        for world in worlds:
+        for world in worlds.tolist():
             last[world] = world_of(observation, world)
         infos["final_obs"], infos["_final_obs"] = last, ended.copy()
         infos["final_info"], infos["_final_info"] = _infos(info, ended), ended
