@@ -26,6 +26,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 from numba.core import cgutils, types
+from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
 _SETTINGS: Any = importlib.import_module("numba.core.config")
@@ -35,12 +36,33 @@ _loading = threading.Lock()
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function to IEEE arithmetic that runs without the interpreter lock.
+    """Compile a function that other kernels call, to IEEE arithmetic.
 
     No fastmath: the bits must not depend on the processor. error_model="numpy", as the branch that
-    raises ZeroDivisionError would stop the vectoriser.
+    raises ZeroDivisionError would stop the vectoriser. What would unpack the arguments from Python
+    objects is left out: for a model's tables it took as long to compile as the function itself.
     """
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    dispatcher = _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    if not _SETTINGS.DISABLE_JIT:
+        dispatcher.__class__ = _Inner
+    return dispatcher
+
+
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that Python calls; it runs without the interpreter lock."""
+    return _compiled(function, nogil=True, no_cfunc_wrapper=True)
+
+
+class _Inner(CPUDispatcher):
+    """Refuses calls from Python: they would jump to an address that is not there."""
+
+    def __call__(self, *_: Any) -> Any:
+        raise TypeError(f"{self.__name__} is called by kernels only; make it an entry to call it")
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile a function with numba, cached on disk if a folder can be written."""
+    options["error_model"] = "numpy"
     folder = cache_folder()
     if folder is None:
         return numba.njit(**options)(function)

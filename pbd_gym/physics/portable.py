@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry
 
 
 def exp(y: Any) -> np.ndarray:
@@ -24,7 +24,7 @@ def exp(y: Any) -> np.ndarray:
     return result
 
 
-@kernel
+@entry
 def exp_scalar(y: float) -> float:
     """Return e^y for one number y <= 0, for use within kernels: the same bits as `exp`.
 
@@ -39,7 +39,7 @@ def exp_scalar(y: float) -> float:
     return total
 
 
-@kernel
+@entry
 def _exp(values: Any, result: Any) -> None:
     """Apply `exp_scalar` elementwise."""
     for index in range(values.shape[0]):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry
 
 
 def check_targets(targets: np.ndarray, pins: np.ndarray, grabbed: np.ndarray) -> None:
@@ -28,7 +28,7 @@ def check_targets(targets: np.ndarray, pins: np.ndarray, grabbed: np.ndarray) ->
     raise ValueError(f"target of {what} in world {world} is {targets[world, index]}")
 
 
-@kernel
+@entry
 def _first_not_finite(targets: Any, num_pins: int, grabbed: Any) -> int:
     """Return world * (P + G) + index of the first target that is needed and not finite, or -1."""
     for world in range(targets.shape[0]):

@@ -8,7 +8,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from pbd_gym.physics import portable
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry
 from pbd_gym.physics.model import Model
 from pbd_gym.physics.parameters import Timing, as_read
 
@@ -85,7 +85,7 @@ def timing_of(model: Model, dt: float, substeps: int, dtype: np.dtype) -> Timing
     return as_read(Timing(dt, h, 1.0 / h**2, decay, rest_speed, gravity, _SPEED_LIMIT), dtype)
 
 
-@kernel
+@entry
 def count_substeps(
     x: Any,
     v: Any,

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry
 
 
-@kernel
+@entry
 def clip_actions(actions: Any, clipped: Any, excess: Any) -> bool:
     """Clip actions to [-1, 1]; return whether all of them are finite.
 
@@ -31,7 +31,7 @@ def clip_actions(actions: Any, clipped: Any, excess: Any) -> bool:
     return finite
 
 
-@kernel
+@entry
 def find_diverged(x: Any, bound: float, diverged: Any) -> bool:
     """Mark the worlds of which a coordinate is beyond a bound [m] or NaN; say if there are any.
 
@@ -52,7 +52,7 @@ def find_diverged(x: Any, bound: float, diverged: Any) -> bool:
     return found
 
 
-@kernel
+@entry
 def keep_score(
     reward: Any,
     reached: Any,
@@ -93,7 +93,7 @@ def keep_score(
         normalized[world] = 1.0 - (best - performance[world]) / possible
 
 
-@kernel
+@entry
 def clip_observations(observations: Any, limit: float) -> None:
     """Clip observations (n, size) to [-limit, limit], in place; NaN stays."""
     most = observations.dtype.type(limit)

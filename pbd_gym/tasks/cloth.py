@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pbd_gym.physics import Model, ModelBuilder, World, shapes
-from pbd_gym.physics.compiling import kernel, loaded_lanes
+from pbd_gym.physics.compiling import entry, loaded_lanes
 from pbd_gym.physics.portable import cos_sin
 from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, number
 from pbd_gym.tasks.rewards import closeness
@@ -262,7 +262,7 @@ class Cloth(Task):
         return np.clip(world.reshape(-1, 6) / self.max_speed, -1.0, 1.0).astype(np.float32)
 
 
-@kernel
+@entry
 def _observe(x: Any, v: Any, goal: Any, goal_axis: Any, observed: Any, observations: Any) -> None:
     """Write the observations of n worlds; see the class for what they hold."""
     double = x.dtype.type(2)
@@ -281,7 +281,7 @@ def _observe(x: Any, v: Any, goal: Any, goal_axis: Any, observed: Any, observati
             observations[world, 2 * size + 2 + axis] = goal_axis[world, axis]
 
 
-@kernel
+@entry
 def _judge(
     x: Any, goal: Any, goal_axis: Any, square: Any, scale: float, distance: Any, reward: Any
 ) -> None:

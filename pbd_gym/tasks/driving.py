@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry, kernel
 
 
-@kernel
+@entry
 def drive_pins(
     x: Any,
     v: Any,

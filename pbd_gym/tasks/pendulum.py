@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pbd_gym.physics import Model, ModelBuilder, shapes
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry
 from pbd_gym.physics.portable import cos_sin
 from pbd_gym.tasks.balancing import SwingUp
 from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, number
@@ -189,7 +189,7 @@ class Pendulum(Task):
         )
 
 
-@kernel
+@entry
 def _observe(x: Any, v: Any, scales: Any, observations: Any) -> None:
     """Write the observations of n worlds; see the class for what they hold."""
     links = x.shape[1] - 1
@@ -204,7 +204,7 @@ def _observe(x: Any, v: Any, scales: Any, observations: Any) -> None:
                 observations[world, 2 + 2 * (links + link) + axis] = rate * scales[3]
 
 
-@kernel
+@entry
 def _judge(
     x: Any,
     v: Any,

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pbd_gym.physics import Model, ModelBuilder, shapes
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry
 from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, number
 from pbd_gym.tasks.rewards import closeness
 
@@ -178,7 +178,7 @@ class Rope(Task):
         return np.clip(velocity / self.max_speed, -1.0, 1.0).astype(np.float32)
 
 
-@kernel
+@entry
 def _observe(
     x: Any, v: Any, goal: Any, observed: Any, centre: Any, scales: Any, observations: Any
 ) -> None:
@@ -201,7 +201,7 @@ def _observe(
                 )
 
 
-@kernel
+@entry
 def _judge(x: Any, goal: Any, scale: float, distance: Any, reward: Any) -> None:
     """Write the distances of n free ends from their goals (n,) [m], and the rewards (n,)."""
     for world in range(x.shape[0]):

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import pbd_gym
+from pbd_gym.physics.compiling import load_kernels
 
 FALL = """
 from scenes import particles_2d
@@ -77,6 +78,11 @@ def test_the_folder_is_another_for_another_processor(tmp_path):
     generic, _ = python(code, **place, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
     assert host != generic
     assert host == python(code, **place)[0]
+
+
+def test_python_is_refused_what_only_kernels_may_call():
+    with pytest.raises(TypeError, match="limit_moves is called by kernels only"):
+        load_kernels(2, 1).limit_moves()
 
 
 def test_physics_is_imported_without_a_word():

@@ -1,6 +1,6 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
-from ..compiling import borrowed, kernel, row
+from ..compiling import borrowed, entry, kernel, row
 from .attachment import project_attachments
 from .chain import project_chain_velocities, project_chains, project_chains_from_start
 from .collider import collide_with_shapes
@@ -39,7 +39,7 @@ _AGAIN = 4
 __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
 
-@kernel
+@entry
 def advance(
     x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, model, timing, substeps
 ):
