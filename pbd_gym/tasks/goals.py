@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry
 from pbd_gym.tasks.base import OBSERVATION_LIMIT, Judgement, Start, Task, Variables, choice
 from pbd_gym.tasks.rewards import closeness
 
@@ -87,7 +87,7 @@ class GoalTask(Task):
         return distance, dense
 
 
-@kernel
+@entry
 def _compare(achieved: Any, desired: Any, scale: float, distance: Any, dense: Any) -> None:
     """Write the mean distances of n times k points (n, k, dim) from their places and the rewards.
 
