@@ -80,19 +80,53 @@ class Timing(NamedTuple):
 
 
 class Forces(NamedTuple):
-    """Forces [N] of the last substep of a control step, one row per world.
+    """What held and touched in the last substep of a control step, one row per world.
+
+    Forces are averages over that substep. An absent kind of constraint has no columns, an absent
+    kind of contact is zero. The kernels number the kinds in this order.
 
     Attributes:
-        chains: (W, links) of the chains, the first of `Model.links`; positive where a link pulls.
-        distances: (W, E); positive where a distance pulls.
-        bends: (W, B) size of the force on each outer particle; the middle one feels twice that.
-        walls: (W, N, dim) of walls and shapes on each particle, friction included.
+        chains: (W, links) tension [N] of the chains, the first of `Model.links`; negative where a
+            link pushes. Strain limits are part of it, the damping of chains is not.
+        ropes: (W, links) tension [N] of the implicit and slack chains, the others of `Model.links`.
+            What brings a rope that follows a single pin back to length (part 3 in
+            kernels/rope.py) is no force between particles and not part of it.
+        distances: (W, E) pull [N]; negative where a distance pushes.
+        limits: (W, E) pull [N] of slack distances, strain limits and tethers; negative where a
+            lower bound pushes.
+        bends: (W, B) size [N] of the force on each outer particle; the middle one feels twice
+            that. Times the spacing it is the bending moment.
+        rods: (W, joints) the same for each particle of a rod but its first and last.
+        hinges: (W, H) torque [N m] about the edge; positive where it lessens the angle.
+        folds: (W, F) size [N] of the multiplier; corner i feels weight_i times that.
+        volumes: (W, V) pressure with which a content pushes outwards, [N/m] of an area and [Pa] of
+            a volume or tetrahedron; negative where it is larger than its rest.
+        shape_matches: (W, L, dim) force [N] on each particle of each matched body; a pin's is 0.
+        attachments: (W, A, dim) force [N] on the particle; its anchor feels the opposite.
+        walls: (W, N, dim) force [N] of the room on each particle, friction included.
+        colliders: (W, N, dim) the same of solid shapes.
+        self_collision: (W, N, dim) the same of the other particles of a cloth.
+        encounters: (W, N, dim) the same of other bodies.
+        contacts: (W, N) sum [N] of the sizes of all normal forces on each particle: what presses
+            on it, whatever it is that touches.
     """
 
     chains: Any
+    ropes: Any
     distances: Any
+    limits: Any
     bends: Any
+    rods: Any
+    hinges: Any
+    folds: Any
+    volumes: Any
+    shape_matches: Any
+    attachments: Any
     walls: Any
+    colliders: Any
+    self_collision: Any
+    encounters: Any
+    contacts: Any
 
 
 def as_read(table: Any, dtype: np.dtype) -> Any:

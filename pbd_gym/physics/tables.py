@@ -307,6 +307,14 @@ def entries_of_links(table: Chains | Ropes) -> np.ndarray:
     return np.flatnonzero(~last)
 
 
+def entries_of_joints(table: Rods) -> np.ndarray:
+    """Return the entries of rods at which they bend, all but the first and last of each."""
+    inner = np.ones(len(table.particles), dtype=bool)
+    inner[table.offsets[:-1]] = False
+    inner[table.offsets[1:] - 1] = False
+    return np.flatnonzero(inner)
+
+
 def links_in_rows(table: Chains | Ropes) -> tuple[np.ndarray, np.ndarray]:
     """Return the links of chains or ropes: their particles (links, 2) and rest lengths [m]."""
     entries = entries_of_links(table)

@@ -9,7 +9,7 @@ import numpy as np
 from pbd_gym.physics import compiling
 from pbd_gym.physics.model import Model
 from pbd_gym.physics.parameters import Forces, Parameters, as_read
-from pbd_gym.physics.recording import copy_of_forces, recorded_forces, scratch_of_forces
+from pbd_gym.physics.recording import allocate_forces, copy_of_forces
 from pbd_gym.physics.scratch import allocate
 from pbd_gym.physics.snapshot import Snapshot
 from pbd_gym.physics.targets import check_targets
@@ -169,7 +169,7 @@ class World:
             self._advance_in_groups(dt, substeps, targets)
         else:
             self._advance(targets, self._shares, substeps)
-        self.forces = copy_of_forces(self.model, self._recorded) if record else None
+        self.forces = copy_of_forces(self.model, self._noted[0][2]) if record else None
 
     def _advance(self, targets: np.ndarray, shares: list[tuple[Any, ...]], substeps: int) -> None:
         """Advance the worlds of each share on a thread of its own."""
@@ -228,11 +228,9 @@ class World:
         self._timings = timings
         self._noted: list[Any] = [None] * self.num_threads
         if record:
-            self._recorded = recorded_forces(model, self.num_worlds, dtype)
-            self._noted = [
-                (*(scratch_of_forces(model, self.lanes, dtype) for _ in range(2)), self._recorded)
-                for _ in range(self.num_threads)
-            ]
+            self._noted = allocate_forces(
+                model, self.num_worlds, self.lanes, self.num_threads, dtype
+            )
         self._shares = self._share_out(np.zeros(1, dtype=np.int64) if adaptive else None)
         self._substeps_used[:] = counts[0]
         self._compile(counts[0], adaptive, record)

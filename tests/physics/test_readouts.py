@@ -162,6 +162,17 @@ def test_forces_belong_to_the_last_step_only():
     assert state.forces is None
 
 
+def test_kinds_that_a_model_lacks_have_no_forces():
+    state = hanging()
+    state.step(DT, SUBSTEPS, record=True)
+    particles = ("walls", "colliders", "self_collision", "encounters")
+    for name, part in state.forces._asdict().items():
+        if name in particles:
+            np.testing.assert_array_equal(part, np.zeros((1, 11, 2)), name)
+        elif name not in ("chains", "contacts"):
+            assert part.shape[:2] == (1, 0), name
+
+
 def test_modified_energy_is_invariant_in_free_flight():
     state = world(particles_2d([(0.0, 0.0), (1.0, 2.0)], mass=0.7))
     state.v[0] = [(1.0, 5.0), (-2.0, 3.0)]

@@ -10,7 +10,7 @@ is let out at `_PARTING_SPEED` only (Macklin et al. 2019, eq. 10).
 import numpy as np
 
 from ..compiling import kernel, row
-from .forces import note, wall_row
+from .forces import COLLIDERS, CONTACTS, force_row, note_move
 from .layout import DIM, GAP, LANES, NORMAL, POSITION, SHARE, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
@@ -42,10 +42,14 @@ def collide_with_shapes(work, masses, colliders, timing, forces):
                 else:
                     _measure_capsule(at, first, second, start, end, size[0] + margin)
                 if _count_inside(at) > 0:
-                    w, force = inverse_mass_of(masses, particle), wall_row(forces, particle)
+                    w = inverse_mass_of(masses, particle)
+                    told = (
+                        force_row(forces, COLLIDERS, particle * DIM),
+                        force_row(forces, CONTACTS, particle),
+                    )
                     for lane in range(LANES):
                         if at[GAP + lane] < 0 and in_lane(w, at, lane) > 0:
-                            _put_outside(at, first, second, lane, colliders, shape, timing, force)
+                            _put_outside(at, first, second, lane, colliders, shape, timing, w, told)
 
 
 @kernel
@@ -153,7 +157,7 @@ def _measure_capsule(at, first, second, start, end, radius):
 
 
 @kernel
-def _put_outside(at, first, second, lane, colliders, shape, timing, force):
+def _put_outside(at, first, second, lane, colliders, shape, timing, mass, told):
     """Move a particle along the normal to the surface, with friction and restitution.
 
     The velocity is read off later as (x - x_start)/h, so the start is shifted to where a particle
@@ -180,6 +184,9 @@ def _put_outside(at, first, second, lane, colliders, shape, timing, force):
     # static: the whole slide is taken back; kinetic: as much as friction can hold
     share = one if distance <= friction * push else kinetic * push / distance
     rebound = restitution * approach * timing.h if approach > timing.rest_speed else zero
+    force, pressed = told
+    w = in_lane(mass, at, lane)
+    note_move(pressed, lane, rebound - way, w)
     for k in range(DIM):
         normal = at[NORMAL + k * LANES + lane]
         carried = _carried(at, first, second, k, lane)
@@ -187,7 +194,7 @@ def _put_outside(at, first, second, lane, colliders, shape, timing, force):
         move, shift = push * normal - share * slide, (way + push - rebound) * normal
         at[POSITION + k * LANES + lane] += move
         at[START + k * LANES + lane] += shift
-        note(force, k * LANES + lane, move - shift)
+        note_move(force, k * LANES + lane, move - shift, w)
 
 
 @kernel

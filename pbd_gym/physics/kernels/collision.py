@@ -8,6 +8,7 @@ Contacts are solved in every substep, world by world, in the order in which they
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import SELF_COLLISION, note_contact, note_normal
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
@@ -100,7 +101,7 @@ def _square_distance(a, b, quantity, lane, zero):
 
 
 @kernel
-def collide_with_self(work, masses, collision, found, h):
+def collide_with_self(work, masses, collision, found, h, forces):
     """Push the listed pairs apart to the collision distance, and note which of them touch.
 
     A pair that began the substep closer than that is let apart at `_PARTING_SPEED` only (Macklin et
@@ -128,14 +129,25 @@ def collide_with_self(work, masses, collision, found, h):
                 before = np.sqrt(_square_distance(a, b, START, lane, zero))
                 depth = max(min(distance, before + parting) - length, zero)
                 push = depth / (length * total)
+                told = _told(forces, i, j, type(h)(1))
+                note_normal(told, lane, depth / total)
                 for k in range(DIM):
                     move = push * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
                     a[POSITION + k * LANES + lane] += w_a * move
                     b[POSITION + k * LANES + lane] -= w_b * move
+                    note_contact(told, k * LANES + lane, move)
 
 
 @kernel
-def rub_against_self(work, masses, collision, found, h, gravity):
+def _told(forces, i, j, one):
+    """Return where the forces of a pair are noted, None if nobody asks."""
+    if forces is None:
+        return None
+    return forces, SELF_COLLISION, (i, j), (one, -one)
+
+
+@kernel
+def rub_against_self(work, masses, collision, found, h, gravity, forces):
     """Dry friction of touching pairs: take back their relative velocity, as far as can be held.
 
     It acts on the velocities that all constraints have left: rubbed before, the links would pull
@@ -155,8 +167,10 @@ def rub_against_self(work, masses, collision, found, h, gravity):
                 w_a = in_lane(inverse_mass_of(masses, i), a, lane)
                 w_b = in_lane(inverse_mass_of(masses, j), b, lane)
                 share = min(held / speed, one) / (w_a + w_b) if speed > zero else zero
+                told = _told(forces, i, j, one)
                 for k in range(DIM):
                     at = VELOCITY + k * LANES + lane
                     change = share * (a[at] - b[at])
                     a[at] -= w_a * change
                     b[at] += w_b * change
+                    note_contact(told, k * LANES + lane, -change * h)

@@ -3,9 +3,9 @@
 import numpy as np
 
 from ..compiling import kernel, row
-from .forces import note, wall_row
+from .forces import CONTACTS, WALLS, force_row, note_move
 from .layout import DIM, LANES, MULTIPLIER, POSITION, START, VELOCITY
-from .masses import inverse_mass_of, is_grabbed
+from .masses import in_lane, inverse_mass_of, is_grabbed
 
 
 @kernel
@@ -15,12 +15,13 @@ def collide_with_walls(work, masses, room, forces):
     radius, friction, kinetic = room.radius, room.friction, room.kinetic_friction
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
-            at, force = row(work, particle), wall_row(forces, particle)
-            mass = inverse_mass_of(masses, particle)
+            at, mass = row(work, particle), inverse_mass_of(masses, particle)
+            force = force_row(forces, WALLS, particle * DIM)
+            normal = force_row(forces, CONTACTS, particle)
             for axis in range(DIM):
                 if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
                     lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                    _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force)
+                    _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force, normal)
 
 
 @kernel
@@ -34,12 +35,13 @@ def read_velocities(work, masses, room, h, rest_speed, forces):
     radius, restitution = room.radius, room.restitution
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
-            at, force = row(work, particle), wall_row(forces, particle)
-            mass = inverse_mass_of(masses, particle)
+            at, mass = row(work, particle), inverse_mass_of(masses, particle)
+            force = force_row(forces, WALLS, particle * DIM)
+            normal = force_row(forces, CONTACTS, particle)
             for axis in range(DIM):
                 if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
                     lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                    _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force)
+                    _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force, normal)
                 else:
                     _read_off(at, mass, axis, h)
 
@@ -53,7 +55,7 @@ def _read_off(at, mass, axis, h):
 
 
 @kernel
-def _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force):
+def _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force, normal):
     """Clamp one coordinate; Coulomb friction holds back the others.
 
     Macklin et al. 2014, eq. 23-24. In two loops over the lanes: LLVM does not vectorise one that
@@ -66,7 +68,9 @@ def _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force):
         after = before if is_grabbed(mass, at, lane) else min(max(before, lower), upper)
         at[MULTIPLIER + lane] = abs(after - before)
         at[POSITION + axis * LANES + lane] = after
-        note(force, axis * LANES + lane, after - before)
+        w = in_lane(mass, at, lane)
+        note_move(force, axis * LANES + lane, after - before, w)
+        note_move(normal, lane, abs(after - before), w)
     for lane in range(LANES):
         depth = at[MULTIPLIER + lane]
         square = zero
@@ -80,11 +84,11 @@ def _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force):
             slide = at[POSITION + k * LANES + lane] - at[START + k * LANES + lane]
             rub = share * slide if k != axis else zero
             at[POSITION + k * LANES + lane] -= rub
-            note(force, k * LANES + lane, -rub)
+            note_move(force, k * LANES + lane, -rub, in_lane(mass, at, lane))
 
 
 @kernel
-def _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force):
+def _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force, normal):
     """Read the velocity of one axis; at a wall the restituted one (Mueller et al. 2020, eq. 34).
 
     The speed before the impact is the predicted one, gravity's kick included. Setting the outward
@@ -106,4 +110,6 @@ def _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force):
         speed = max(rebound, zero) if at_lower else read
         speed = min(rebound, zero) if at_upper else speed
         at[VELOCITY + axis * LANES + lane] = speed
-        note(force, axis * LANES + lane, position - before + (speed - read) * h)
+        w, push = in_lane(mass, at, lane), position - before + (speed - read) * h
+        note_move(force, axis * LANES + lane, push, w)
+        note_move(normal, lane, -push if at_upper else push, w)

@@ -11,6 +11,7 @@ substep, world by world, in the order in which they were listed.
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import ENCOUNTERS, note_contact, note_normal
 from .layout import DIM, LANES, NORMAL, POSITION, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
@@ -81,7 +82,7 @@ def _can_meet(c, a, b, reach, travel, beyond):
 
 
 @kernel
-def collide_with_others(work, masses, encounters, listed, timing, sweep):
+def collide_with_others(work, masses, encounters, listed, timing, sweep, forces):
     """Push apart what is listed and too close, with friction, and note how it touches.
 
     What began the substep too close is let apart at `_PARTING_SPEED` only (Macklin et al. 2019, eq.
@@ -107,11 +108,12 @@ def collide_with_others(work, masses, encounters, listed, timing, sweep):
                 if indices[lane, entry, 1] == _APART:
                     touch, speed = _meet(c, a, b, lane, t, encounters, index, timing)
                     indices[lane, entry, 1], speeds[lane, entry] = touch, speed
-                _push_apart(c, a, b, lane, t, weights, depth, encounters.friction[index])
+                told = _told(forces, encounters, index, t)
+                _push_apart(c, a, b, lane, t, weights, depth, encounters.friction[index], told)
 
 
 @kernel
-def part_from_others(work, masses, encounters, listed):
+def part_from_others(work, masses, encounters, listed, h, forces):
     """Give what touches the velocity at which it parts (Mueller et al. 2020, eq. 34).
 
     What bounces has that of restitution. What does not may not part faster than it did before it
@@ -134,9 +136,12 @@ def part_from_others(work, masses, encounters, listed):
             for k in range(DIM):
                 parting += _normal(c, k, lane) * _apart(c, a, b, VELOCITY, t, k, lane)
             if touch == _BOUNCES or parting > speed:
+                told, change = _told(forces, encounters, index, t), (speed - parting) / weights[3]
+                note_normal(told, lane, change * h)
                 for k in range(DIM):
-                    change = (speed - parting) / weights[3] * _normal(c, k, lane)
-                    _move(c, a, b, VELOCITY + k * LANES + lane, weights, change)
+                    change_k = change * _normal(c, k, lane)
+                    _move(c, a, b, VELOCITY + k * LANES + lane, weights, change_k)
+                    note_contact(told, k * LANES + lane, change_k * h)
 
 
 @kernel
@@ -238,7 +243,7 @@ def _meet(c, a, b, lane, t, encounters, index, timing):
 
 
 @kernel
-def _push_apart(c, a, b, lane, t, weights, depth, friction):
+def _push_apart(c, a, b, lane, t, weights, depth, friction, told):
     """Part a particle and a link by a depth [m].
 
     Friction takes back the sideways motion as far as the push can hold it (Macklin et al. 2014, eq.
@@ -253,10 +258,12 @@ def _push_apart(c, a, b, lane, t, weights, depth, friction):
         square += slide * slide
     slid, held = np.sqrt(square), friction * push
     share = held / slid if slid > held else push * 0 + 1
+    note_normal(told, lane, push / weights[3])
     for k in range(DIM):
         slide = _motion(c, a, b, t, k, lane) - way * _normal(c, k, lane)
         move = (push * _normal(c, k, lane) - share * slide) / weights[3]
         _move(c, a, b, POSITION + k * LANES + lane, weights, move)
+        note_contact(told, k * LANES + lane, move)
 
 
 @kernel
@@ -265,3 +272,13 @@ def _move(c, a, b, at, weights, move):
     c[at] += weights[0] * move
     a[at] -= weights[1] * move
     b[at] -= weights[2] * move
+
+
+@kernel
+def _told(forces, encounters, index, t):
+    """Return where the forces of an encounter are noted, None if nobody asks."""
+    if forces is None:
+        return None
+    real, links = type(encounters.distance[index]), encounters.links
+    corners = encounters.particles[index], links[index, 0], links[index, 1]
+    return forces, ENCOUNTERS, corners, (real(1), real(t - 1), real(-t))

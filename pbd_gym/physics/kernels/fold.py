@@ -6,6 +6,7 @@ The edge runs from corner 0 to corner 1; corners 2 and 3 are the wings.
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import FOLDS, HINGES, force_row, note
 from .layout import LANES, POSITION
 from .masses import in_lane, inverse_mass_of
 
@@ -15,7 +16,7 @@ _FLATTEST = 1e-10
 
 
 @kernel
-def project_folds(work, masses, folds, inverse_h2):
+def project_folds(work, masses, folds, inverse_h2, forces):
     """Draw C = sum_i weight_i x_i to zero (Bergou et al. 2006): linear, keeps both momenta."""
     if folds is None:
         return
@@ -33,11 +34,12 @@ def project_folds(work, masses, folds, inverse_h2):
             inverse_mass_of(masses, m),
             (weights[index, 0], weights[index, 1], weights[index, 2], weights[index, 3]),
             compliance[index] * inverse_h2,
+            force_row(forces, FOLDS, index),
         )
 
 
 @kernel
-def _fold(a, b, c, d, mass_a, mass_b, mass_c, mass_d, weights, alpha):
+def _fold(a, b, c, d, mass_a, mass_b, mass_c, mass_d, weights, alpha, force):
     real = type(a[0])
     one, zero = real(1), real(0)
     p, q, r, s = weights
@@ -46,16 +48,19 @@ def _fold(a, b, c, d, mass_a, mass_b, mass_c, mass_d, weights, alpha):
         w_c, w_d = in_lane(mass_c, c, lane), in_lane(mass_d, d, lane)
         total = p * p * w_a + q * q * w_b + r * r * w_c + s * s * w_d + alpha
         share = one / total if total > zero else zero
+        pull = zero
         for at in range(X + lane, X + 3 * LANES + lane, LANES):
             move = share * (p * a[at] + q * b[at] + r * c[at] + s * d[at])
             a[at] -= p * w_a * move
             b[at] -= q * w_b * move
             c[at] -= r * w_c * move
             d[at] -= s * w_d * move
+            pull += move * move
+        note(force, lane, np.sqrt(pull))
 
 
 @kernel
-def project_hinges(work, masses, hinges, inverse_h2):
+def project_hinges(work, masses, hinges, inverse_h2, forces):
     """Turn the wings of every hinge towards its rest angle (Mueller et al. 2007, appendix A)."""
     if hinges is None:
         return
@@ -75,11 +80,12 @@ def project_hinges(work, masses, hinges, inverse_h2):
             cosine[index],
             sine[index],
             compliance[index] * inverse_h2,
+            force_row(forces, HINGES, index),
         )
 
 
 @kernel
-def _hinge(a, b, c, d, mass_a, mass_b, mass_c, mass_d, cosine, sine, alpha):
+def _hinge(a, b, c, d, mass_a, mass_b, mass_c, mass_d, cosine, sine, alpha, force):
     """Turn by the gradients of the angle phi; the error is C = 2 sin((phi - rest)/2).
 
     For small errors that is phi - rest. It is the torque of the energy 4 (1 - cos((phi - rest)/2))
@@ -113,6 +119,7 @@ def _hinge(a, b, c, d, mass_a, mass_b, mass_c, mass_d, cosine, sine, alpha):
         total += w_a * (a_c * a_c * square_up + a_d * a_d * square_down + a_c * a_d * mixed)
         total += w_b * (b_c * b_c * square_up + b_d * b_d * square_down + b_c * b_d * mixed)
         move = zero if degenerate or total <= zero else error / total
+        note(force, lane, move)
         if degenerate:
             at_c, at_d, a_c, a_d, b_c, b_d = zero, zero, zero, zero, zero, zero
         for k in range(3):

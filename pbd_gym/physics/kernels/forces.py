@@ -1,60 +1,87 @@
-"""Forces of constraints, noted only where they were asked for.
+"""Forces of constraints and contacts, noted only where they were asked for.
 
 A constraint moves the particles of a substep by w n s: its force along n, averaged over the
-substep, is s/h^2. What the second half of RATTLE adds to the velocities counts as s h. The scratch
-collects s over the iterations of a substep; without it (None) no line of this is compiled. `forces`
-are what is collected, what is kept while a substep is solved again, and what is handed out.
+substep, is s/h^2. What is added to the velocities (the second half of RATTLE, restitution, rubbing)
+counts as s h. The s are collected over all iterations of a substep.
+
+`forces` is None, and no line of this is compiled, or a tuple of
+    what is collected, (rows, LANES): one row for each number that is told of a world,
+    what is put aside while a substep is solved again, of the same shape,
+    what is handed out, (W, rows), and
+    the first row of each kind, in the order of `Forces`.
+A constraint with a vector has DIM rows, so that a pointer to the first serves k * LANES + lane.
 """
 
 import numpy as np
 
 from ..compiling import kernel, row
+from ..parameters import Forces
 from .layout import DIM, DIRECTION, FAILED, LANES, MULTIPLIER, TOO_FAST
-from .masses import in_lane, inverse_mass_of
 from .tiles import lanes_used, world_of
 
+(
+    CHAINS,
+    ROPES,
+    DISTANCES,
+    LIMITS,
+    BENDS,
+    RODS,
+    HINGES,
+    FOLDS,
+    VOLUMES,
+    SHAPE_MATCHES,
+    ATTACHMENTS,
+    WALLS,
+    COLLIDERS,
+    SELF_COLLISION,
+    ENCOUNTERS,
+    CONTACTS,
+) = range(len(Forces._fields))
+
 
 @kernel
-def forget_forces(forces):
-    """Begin a substep."""
+def force_row(forces, kind, index):
+    """Return where a force is collected, or None; index counts numbers, DIM to a vector."""
     if forces is None:
+        return None
+    return row(forces[0], forces[3][kind] + index)
+
+
+@kernel
+def note(force, at, multiplier):
+    """Add to what is collected in a row of `force_row`."""
+    if force is not None:
+        force[at] += multiplier
+
+
+@kernel
+def note_move(force, at, move, inverse_mass):
+    """Add what moves a particle; what cannot be moved feels no force."""
+    if force is not None and inverse_mass > 0:
+        force[at] += move / inverse_mass
+
+
+@kernel
+def note_normal(told, lane, push):
+    """Add what presses the particles of a contact together.
+
+    told: the forces, a kind, the particles and their shares in a force on the first; or None.
+    """
+    if told is None:
         return
-    noted = forces[0]
-    noted.chains[:] = 0
-    noted.distances[:] = 0
-    noted.bends[:] = 0
-    noted.walls[:] = 0
+    forces, _, corners, shares = told
+    for corner in range(len(corners)):
+        note(force_row(forces, CONTACTS, corners[corner]), lane, abs(shares[corner]) * push)
 
 
 @kernel
-def distance_row(forces, index):
-    """Return where the force of a distance is collected, or None."""
-    if forces is None:
-        return None
-    return row(forces[0].distances, index)
-
-
-@kernel
-def bend_row(forces, index):
-    """Return where the force of a bend is collected, or None."""
-    if forces is None:
-        return None
-    return row(forces[0].bends, index)
-
-
-@kernel
-def wall_row(forces, particle):
-    """Return where the moves of a particle by walls are collected, or None."""
-    if forces is None:
-        return None
-    return row(forces[0].walls, particle)
-
-
-@kernel
-def note(forces, index, multiplier):
-    """Add to what is collected in a row."""
-    if forces is not None:
-        forces[index] += multiplier
+def note_contact(told, at, push):
+    """Add one component of the force on the first particle of a contact, and what answers it."""
+    if told is None:
+        return
+    forces, kind, corners, shares = told
+    for corner in range(len(corners)):
+        note(force_row(forces, kind, corners[corner] * DIM), at, shares[corner] * push)
 
 
 @kernel
@@ -63,7 +90,7 @@ def note_chain(forces, work, particles, first, last, scale):
     if forces is None:
         return
     for entry in range(first, last):
-        at, into = row(work, particles[entry]), row(forces[0].chains, entry)
+        at, into = row(work, particles[entry]), force_row(forces, CHAINS, entry)
         for lane in range(LANES):
             square = scale * 0
             for k in range(DIM):
@@ -73,10 +100,11 @@ def note_chain(forces, work, particles, first, last, scale):
 
 
 @kernel
-def note_limit(forces, entry, lane, multiplier):
-    """Collect what the strain limit of a chain's link adds."""
-    if forces is not None:
-        forces[0].chains[entry, lane] += multiplier
+def forget_forces(forces):
+    """Begin a substep."""
+    if forces is None:
+        return
+    forces[0][:] = 0
 
 
 @kernel
@@ -84,10 +112,7 @@ def keep_forces(forces):
     """Put aside what a solve that may have failed has collected, and begin again."""
     if forces is None:
         return
-    noted, kept = forces[0], forces[1]
-    kept.chains[:] = noted.chains
-    kept.distances[:] = noted.distances
-    kept.bends[:] = noted.bends
+    forces[1][:] = forces[0]
     forget_forces(forces)
 
 
@@ -96,34 +121,22 @@ def take_up_kept_forces(forces, work):
     """Return to what was put aside in the lanes that have not failed."""
     if forces is None:
         return
-    noted, kept = forces[0], forces[1]
+    collected, kept = forces[0], forces[1]
     marks = row(work, work.shape[0] - 2)
     for lane in range(LANES):
         if marks[FAILED + lane] == 0:
-            noted.chains[:, lane] = kept.chains[:, lane]
-            noted.distances[:, lane] = kept.distances[:, lane]
-            noted.bends[:, lane] = kept.bends[:, lane]
+            collected[:, lane] = kept[:, lane]
 
 
 @kernel
-def store_forces(forces, x, tile, worlds, work, masses, inverse_h2, mark):
-    """Write the forces [N] of the last substep, for the lanes of a tile that bear a mark."""
+def store_forces(forces, x, tile, worlds, work, inverse_h2, mark):
+    """Write the forces of the last substep, for the lanes of a tile that bear a mark."""
     if forces is None:
         return
-    noted, _, out = forces
+    collected, out = forces[0], forces[2]
     marks = row(work, work.shape[0] - 2)
     for lane in range(lanes_used(tile, x, worlds)):
-        if marks[TOO_FAST + lane] != mark:
-            continue
-        world = world_of(tile, lane, x, worlds)
-        for index in range(out.chains.shape[1]):
-            out.chains[world, index] = noted.chains[index, lane] * inverse_h2
-        for index in range(out.distances.shape[1]):
-            out.distances[world, index] = noted.distances[index, lane] * inverse_h2
-        for index in range(out.bends.shape[1]):
-            out.bends[world, index] = noted.bends[index, lane] * inverse_h2
-        for particle in range(out.walls.shape[1]):
-            w = in_lane(inverse_mass_of(masses, particle), row(work, particle), lane)
-            for k in range(DIM):
-                move = noted.walls[particle, k * LANES + lane]
-                out.walls[world, particle, k] = move * inverse_h2 / w if w > 0 else w
+        if marks[TOO_FAST + lane] == mark:
+            world = world_of(tile, lane, x, worlds)
+            for index in range(out.shape[1]):
+                out[world, index] = collected[index, lane] * inverse_h2

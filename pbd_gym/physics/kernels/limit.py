@@ -3,12 +3,13 @@
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import LIMITS, force_row, note
 from .layout import DIM, LANES, POSITION
 from .masses import in_lane, inverse_mass_of
 
 
 @kernel
-def project_limits(work, masses, limits, inverse_h2, iteration):
+def project_limits(work, masses, limits, inverse_h2, iteration, forces):
     """Bring every distance that has left its bounds back to the nearer one.
 
     It is C = |x_a - x_b| - greatest <= 0 and least - |x_a - x_b| <= 0 (Mueller et al. 2007, 3.3:
@@ -30,11 +31,12 @@ def project_limits(work, masses, limits, inverse_h2, iteration):
                 least[index],
                 greatest[index],
                 alpha * inverse_h2,
+                force_row(forces, LIMITS, index),
             )
 
 
 @kernel
-def _limit(a, b, mass_a, mass_b, least, greatest, alpha):
+def _limit(a, b, mass_a, mass_b, least, greatest, alpha, force):
     real = type(a[0])
     one, zero = real(1), real(0)
     for lane in range(LANES):
@@ -48,6 +50,7 @@ def _limit(a, b, mass_a, mass_b, least, greatest, alpha):
         length = np.sqrt(square)
         error = max(length - greatest, zero) + min(length - least, zero)
         scale = share * error / length if length > zero else zero
+        note(force, lane, scale * length)
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
             a[POSITION + k * LANES + lane] -= w_a * move

@@ -4,6 +4,7 @@ Mueller et al. 2005, "Meshless deformations based on shape matching".
 """
 
 from ..compiling import kernel, row
+from .forces import SHAPE_MATCHES, force_row, note_move
 from .layout import CENTRE, DIM, LANES, MOMENT, POSITION, REST_CENTRE, SUMS, TOTAL
 from .masses import in_lane, inverse_mass_of
 from .rotation import rotate_2d, rotate_3d
@@ -12,7 +13,7 @@ _PIN_WEIGHT = 1000.0  # of a pin, where all free particles of its body together 
 
 
 @kernel
-def match_shapes(work, masses, matches, inverse_h2, iteration):
+def match_shapes(work, masses, matches, inverse_h2, iteration, forces):
     """Draw every particle of a body by the same share to its place in the turned rest shape.
 
     One share for the whole body: so the corrections add up to no impulse and, as the rotation is
@@ -44,8 +45,9 @@ def match_shapes(work, masses, matches, inverse_h2, iteration):
                 rotate_3d(sums)
             share = one / (one + softness[index] * inverse_h2)
             for entry in range(first, last):
-                i = particles[entry]
-                _move(row(work, i), inverse_mass_of(masses, i), row(rest, entry), sums, share)
+                i, force = particles[entry], force_row(forces, SHAPE_MATCHES, entry * DIM)
+                w = inverse_mass_of(masses, i)
+                _move(row(work, i), w, row(rest, entry), sums, share, force)
 
 
 @kernel
@@ -92,7 +94,7 @@ def _add_to_moment(at, inverse_mass, weight, rest, sums):
 
 
 @kernel
-def _move(at, inverse_mass, rest, sums, share):
+def _move(at, inverse_mass, rest, sums, share, force):
     real = type(share)
     zero = real(0)
     for i in range(DIM):
@@ -102,5 +104,6 @@ def _move(at, inverse_mass, rest, sums, share):
                 q = rest[j] - sums[REST_CENTRE + j * LANES + lane]
                 goal += sums[MOMENT + (i * DIM + j) * LANES + lane] * q
             move = share * (goal - at[POSITION + i * LANES + lane])
-            free = in_lane(inverse_mass, at, lane) > zero
-            at[POSITION + i * LANES + lane] += move if free else zero
+            w = in_lane(inverse_mass, at, lane)
+            at[POSITION + i * LANES + lane] += move if w > zero else zero
+            note_move(force, i * LANES + lane, move, w)

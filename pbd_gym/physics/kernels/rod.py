@@ -17,6 +17,7 @@ The matrix entries of two joints then carry the cosine of their directions.
 import numpy as np
 
 from ..compiling import kernel, row
+from .forces import RODS, force_row, note
 from .layout import COUPLING, DIM, DIRECTION, LANES, MULTIPLIER, PIVOT, POSITION, SCALE
 from .masses import in_lane, inverse_mass_of
 
@@ -27,7 +28,7 @@ UNKNOWN = DIRECTION  # straight: right-hand side, then the joint's multiplier, p
 
 
 @kernel
-def project_rods(work, masses, rods, inverse_h2):
+def project_rods(work, masses, rods, inverse_h2, forces):
     """Bend every rod towards its rest, all joints at once."""
     if rods is None:
         return
@@ -36,10 +37,10 @@ def project_rods(work, masses, rods, inverse_h2):
         first, last = offsets[rod] + 1, offsets[rod + 1] - 1
         if curved[rod]:
             _eliminate_curved(work, masses, rods, first, last, inverse_h2)
-            _substitute_curved(work, masses, rods.particles, first, last)
+            _substitute_curved(work, masses, rods.particles, first, last, forces)
         else:
             _eliminate_straight(work, masses, rods, first, last, inverse_h2)
-            _substitute_straight(work, masses, rods.particles, first, last)
+            _substitute_straight(work, masses, rods.particles, first, last, forces)
 
 
 @kernel
@@ -86,7 +87,7 @@ def _eliminate_vector(beyond, before, a, b, c, mass_a, mass_b, mass_c, alpha):
 
 
 @kernel
-def _substitute_straight(work, masses, particles, first, last):
+def _substitute_straight(work, masses, particles, first, last, forces):
     after = row(work, work.shape[0] - 1)
     beyond = after
     for entry in range(last - 1, first - 1, -1):
@@ -100,6 +101,7 @@ def _substitute_straight(work, masses, particles, first, last):
             inverse_mass_of(masses, i),
             inverse_mass_of(masses, j),
             inverse_mass_of(masses, k),
+            force_row(forces, RODS, entry),
         )
         after, beyond = joint, after
 
@@ -114,17 +116,20 @@ def _substitute_vector(b, after, beyond):
 
 
 @kernel
-def _move_by_vector(a, b, c, mass_a, mass_b, mass_c):
+def _move_by_vector(a, b, c, mass_a, mass_b, mass_c, force):
     real = type(b[0])
-    two = real(2)
+    two, zero = real(2), real(0)
     for lane in range(LANES):
         w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
         w_c = in_lane(mass_c, c, lane)
+        square = zero
         for k in range(DIM):
             multiplier = b[UNKNOWN + k * LANES + lane]
             a[POSITION + k * LANES + lane] -= w_a * multiplier
             b[POSITION + k * LANES + lane] += two * w_b * multiplier
             c[POSITION + k * LANES + lane] -= w_c * multiplier
+            square += multiplier * multiplier
+        note(force, lane, np.sqrt(square))
 
 
 @kernel
@@ -206,7 +211,7 @@ def _eliminate_scalar(beyond, before, a, b, c, mass_a, mass_b, mass_c, alpha):
 
 
 @kernel
-def _substitute_curved(work, masses, particles, first, last):
+def _substitute_curved(work, masses, particles, first, last, forces):
     after = row(work, work.shape[0] - 1)
     beyond = after
     for entry in range(last - 1, first - 1, -1):
@@ -220,6 +225,7 @@ def _substitute_curved(work, masses, particles, first, last):
             inverse_mass_of(masses, i),
             inverse_mass_of(masses, j),
             inverse_mass_of(masses, k),
+            force_row(forces, RODS, entry),
         )
         after, beyond = joint, after
 
@@ -233,12 +239,13 @@ def _substitute_scalar(b, after, beyond):
 
 
 @kernel
-def _move_by_scalar(a, b, c, mass_a, mass_b, mass_c):
+def _move_by_scalar(a, b, c, mass_a, mass_b, mass_c, force):
     real = type(b[0])
     two = real(2)
     for lane in range(LANES):
         w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
         w_c = in_lane(mass_c, c, lane)
+        note(force, lane, abs(b[MULTIPLIER + lane]))
         for k in range(DIM):
             move = b[MULTIPLIER + lane] * b[DIRECTION + k * LANES + lane]
             a[POSITION + k * LANES + lane] -= w_a * move

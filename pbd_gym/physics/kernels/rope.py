@@ -20,6 +20,7 @@ import numpy as np
 
 from ..compiling import kernel, row
 from .chain import _stiffened
+from .forces import ROPES, force_row, note
 from .layout import COUPLING, DIM, DIRECTION, LANES, MULTIPLIER, PIVOT, POSITION, SCALE
 from .masses import in_lane, inverse_mass_of
 
@@ -36,7 +37,7 @@ LENGTH = MULTIPLIER  # in part 3, the length that the link should have
 
 
 @kernel
-def project_ropes(work, masses, ropes, inverse_h2, iteration):
+def project_ropes(work, masses, ropes, inverse_h2, iteration, forces):
     """Find every rope's tensions and the shape that it has under them (parts 1 and 2)."""
     if ropes is None:
         return
@@ -44,24 +45,28 @@ def project_ropes(work, masses, ropes, inverse_h2, iteration):
     for rope in range(offsets.shape[0] - 1):
         first, last = offsets[rope], offsets[rope + 1] - 1
         _find_tensions(work, masses, ropes, first, last, slack[rope], inverse_h2, iteration)
-        _shape(work, masses, ropes, first, last, inverse_h2, iteration)
+        _shape(work, masses, ropes, first, last, inverse_h2, iteration, forces)
 
 
 @kernel
-def finish_ropes(work, masses, ropes, inverse_h2):
+def finish_ropes(work, masses, ropes, inverse_h2, forces):
     """Bring the links of every rope to their lengths (part 3)."""
     if ropes is None:
         return
     offsets, particles, slack = ropes.offsets, ropes.particles, ropes.slack
     for rope in range(offsets.shape[0] - 1):
         first, last = offsets[rope], offsets[rope + 1] - 1
-        _follow_pins(work, masses, ropes, first, last, slack[rope])
+        _follow_pins(work, masses, ropes, first, last, slack[rope], forces)
         # a second iteration: compliant links keep the force that they have
         _find_tensions(work, masses, ropes, first, last, slack[rope], inverse_h2, 1)
         for entry in range(first, last):
             i, j = particles[entry], particles[entry + 1]
             _pull(
-                row(work, i), row(work, j), inverse_mass_of(masses, i), inverse_mass_of(masses, j)
+                row(work, i),
+                row(work, j),
+                inverse_mass_of(masses, i),
+                inverse_mass_of(masses, j),
+                force_row(forces, ROPES, entry),
             )
 
 
@@ -154,8 +159,9 @@ def _back_substitute(a, after, slack):
 
 
 @kernel
-def _pull(a, b, mass_a, mass_b):
+def _pull(a, b, mass_a, mass_b, force):
     for lane in range(LANES):
+        note(force, lane, a[MULTIPLIER + lane])
         for k in range(DIM):
             move = a[MULTIPLIER + lane] * a[DIRECTION + k * LANES + lane]
             a[POSITION + k * LANES + lane] -= in_lane(mass_a, a, lane) * move
@@ -163,7 +169,7 @@ def _pull(a, b, mass_a, mass_b):
 
 
 @kernel
-def _shape(work, masses, ropes, first, last, inverse_h2, iteration):
+def _shape(work, masses, ropes, first, last, inverse_h2, iteration, forces):
     particles, rest, compliance = ropes.particles, ropes.rest, ropes.compliance
     before = row(work, work.shape[0] - 1)
     for entry in range(first, last + 1):
@@ -177,7 +183,7 @@ def _shape(work, masses, ropes, first, last, inverse_h2, iteration):
     after = row(work, work.shape[0] - 1)
     for entry in range(last, first - 1, -1):
         at = row(work, particles[entry])
-        _substitute_shape(at, after)
+        _substitute_shape(at, after, force_row(forces, ROPES, entry))
         after = at
 
 
@@ -201,15 +207,19 @@ def _eliminate_shape(before, a, mass, rest, alpha, is_last):
 
 
 @kernel
-def _substitute_shape(a, after):
+def _substitute_shape(a, after, force):
+    zero = type(a[0])(0)
     for lane in range(LANES):
+        square = zero
         for k in range(DIM):
             at = POSITION + k * LANES + lane
             a[at] = a[SHAPE + k * LANES + lane] + a[COUPLING + lane] * after[at]
+            square += (a[at] - after[at]) * (a[at] - after[at])
+        note(force, lane, a[MULTIPLIER + lane] * np.sqrt(square))
 
 
 @kernel
-def _follow_pins(work, masses, ropes, first, last, slack):
+def _follow_pins(work, masses, ropes, first, last, slack, forces):
     """Bring links to their lengths one after another, away from the pin if there is one.
 
     A rope without pins is swept there and back, as its momentum asks for. Between two pins nothing
@@ -237,6 +247,7 @@ def _follow_pins(work, masses, ropes, first, last, slack):
                 inverse_mass_of(masses, j),
                 slack,
                 turn == 0,
+                force_row(forces, ROPES, entry),
             )
 
 
@@ -256,7 +267,7 @@ def _aim(before, a, b, mass, rest, rigid):
 
 
 @kernel
-def _follow(a, b, end, mass_a, mass_b, slack, outward):
+def _follow(a, b, end, mass_a, mass_b, slack, outward, force):
     real = type(a[0])
     one, zero = real(1), real(0)
     for lane in range(LANES):
@@ -276,6 +287,7 @@ def _follow(a, b, end, mass_a, mass_b, slack, outward):
         error = length - a[LENGTH + lane]
         error = max(error, zero) if slack else error
         scale = error / length if length > zero else zero
+        note(force, lane, error / total if no_pin else zero)
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
             a[POSITION + k * LANES + lane] -= share_a * move

@@ -86,9 +86,9 @@ def advance(
                     limit_moves(work, masses, timing.speed_limit * timing.h)
                 read_velocities(work, masses, model.room, timing.h, timing.rest_speed, forces)
                 _finish(work, model, timing, model.second_order, forces)
-                part_from_others(work, masses, model.encounters, listed)
+                part_from_others(work, masses, model.encounters, listed, timing.h, forces)
                 rub_against_self(
-                    work, masses, model.self_collision, found, timing.h, timing.gravity
+                    work, masses, model.self_collision, found, timing.h, timing.gravity, forces
                 )
                 damp_chains(work, masses, model.chains, timing.h)
                 if attempt > 0:
@@ -100,7 +100,7 @@ def advance(
                 aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
                 move_pins(x, targets, tile, worlds, work, masses, x.dtype.type(0))
             store(x, v, tile, worlds, work, attempt)
-            store_forces(forces, x, tile, worlds, work, masses, timing.inverse_h2, attempt)
+            store_forces(forces, x, tile, worlds, work, timing.inverse_h2, attempt)
             if not failed:
                 break
 
@@ -135,26 +135,26 @@ def _project(work, model, found, timing, iterations, second_order, forces):
     for iteration in range(iterations):
         if iteration == 0:
             project_bends(work, masses, model.bends, inverse_h2, forces)
-            project_hinges(work, masses, model.hinges, inverse_h2)
-            project_folds(work, masses, model.folds, inverse_h2)
-            project_rods(work, masses, model.rods, inverse_h2)
-            collide_with_self(work, masses, model.self_collision, found, timing.h)
+            project_hinges(work, masses, model.hinges, inverse_h2, forces)
+            project_folds(work, masses, model.folds, inverse_h2, forces)
+            project_rods(work, masses, model.rods, inverse_h2, forces)
+            collide_with_self(work, masses, model.self_collision, found, timing.h, forces)
         if second_order is not None:
             project_distances_from_start(
                 work, masses, model.distances, inverse_h2, iteration, forces
             )
         else:
             project_distances(work, masses, model.distances, inverse_h2, iteration, forces)
-        project_limits(work, masses, model.limits, inverse_h2, iteration)
-        project_attachments(work, masses, model.attachments, inverse_h2, iteration)
-        match_shapes(work, masses, model.shape_matches, inverse_h2, iteration)
-        project_volumes(work, masses, model.volumes, inverse_h2, iteration)
+        project_limits(work, masses, model.limits, inverse_h2, iteration, forces)
+        project_attachments(work, masses, model.attachments, inverse_h2, iteration, forces)
+        match_shapes(work, masses, model.shape_matches, inverse_h2, iteration, forces)
+        project_volumes(work, masses, model.volumes, inverse_h2, iteration, forces)
         if second_order is not None:
             project_chains_from_start(work, masses, model.chains, inverse_h2, iteration, forces)
         else:
             project_chains(work, masses, model.chains, inverse_h2, iteration, forces)
-        project_ropes(work, masses, model.ropes, inverse_h2, iteration)
-    finish_ropes(work, masses, model.ropes, inverse_h2)
+        project_ropes(work, masses, model.ropes, inverse_h2, iteration, forces)
+    finish_ropes(work, masses, model.ropes, inverse_h2, forces)
 
 
 @kernel
@@ -180,7 +180,7 @@ def _collide_with_others(work, model, encounters, listed, timing, forces):
         if sweep > 0:
             collide_with_shapes(work, masses, model.colliders, timing, forces)
             collide_with_walls(work, masses, model.room, forces)
-        collide_with_others(work, masses, encounters, listed, timing, sweep)
+        collide_with_others(work, masses, encounters, listed, timing, sweep, forces)
 
 
 @kernel

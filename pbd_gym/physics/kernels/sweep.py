@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..compiling import kernel, row
-from .forces import bend_row, distance_row, note
+from .forces import BENDS, DISTANCES, force_row, note
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
@@ -28,7 +28,7 @@ def project_distances(work, masses, distances, inverse_h2, iteration, forces):
                 rest[index],
                 alpha * inverse_h2,
                 stiffness[index],
-                distance_row(forces, index),
+                force_row(forces, DISTANCES, index),
             )
 
 
@@ -71,7 +71,7 @@ def project_distances_from_start(work, masses, distances, inverse_h2, iteration,
                 rest[index],
                 alpha * inverse_h2,
                 stiffness[index],
-                distance_row(forces, index),
+                force_row(forces, DISTANCES, index),
             )
 
 
@@ -116,7 +116,7 @@ def project_distance_velocities(work, masses, distances, h, forces):
                 inverse_mass_of(masses, i),
                 inverse_mass_of(masses, j),
                 h,
-                distance_row(forces, index),
+                force_row(forces, DISTANCES, index),
             )
 
 
@@ -153,7 +153,7 @@ def project_bends(work, masses, bends, inverse_h2, forces):
         i, j, k = triples[index, 0], triples[index, 1], triples[index, 2]
         a, b, c = row(work, i), row(work, j), row(work, k)
         mass_a, mass_b = inverse_mass_of(masses, i), inverse_mass_of(masses, j)
-        mass_c, force = inverse_mass_of(masses, k), bend_row(forces, index)
+        mass_c, force = inverse_mass_of(masses, k), force_row(forces, BENDS, index)
         alpha, held = compliance[index] * inverse_h2, friction[index] / inverse_h2
         if held > 0:
             _bend_with_friction(a, b, c, mass_a, mass_b, mass_c, alpha, held, force)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..compiling import kernel, row
-from .forces import note_limit
+from .forces import CHAINS, force_row, note
 from .layout import DIM, LANES, POSITION, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
@@ -30,13 +30,12 @@ def limit_strains(work, masses, chains, forces):
                     inverse_mass_of(masses, i),
                     inverse_mass_of(masses, j),
                     greatest[entry],
-                    forces,
-                    entry,
+                    force_row(forces, CHAINS, entry),
                 )
 
 
 @kernel
-def _shorten(a, b, mass_a, mass_b, greatest, forces, entry):
+def _shorten(a, b, mass_a, mass_b, greatest, force):
     real = type(a[0])
     one, zero = real(1), real(0)
     if not _is_longer(a, b, greatest * greatest):
@@ -51,7 +50,7 @@ def _shorten(a, b, mass_a, mass_b, greatest, forces, entry):
             square += delta * delta
         length = np.sqrt(square)
         scale = share * (one - greatest / length) if square > greatest * greatest else zero
-        note_limit(forces, entry, lane, scale * length)
+        note(force, lane, scale * length)
         for k in range(DIM):
             move = scale * (a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane])
             a[POSITION + k * LANES + lane] -= w_a * move

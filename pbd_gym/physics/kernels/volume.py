@@ -1,12 +1,13 @@
 """Closed outlines in the plane keep their area, closed surfaces in space their volume."""
 
 from ..compiling import kernel, row
+from .forces import VOLUMES, force_row, note
 from .layout import CONTENT, DIM, DIRECTION, LANES, POSITION, STIFFNESS
 from .masses import in_lane, inverse_mass_of
 
 
 @kernel
-def project_volumes(work, masses, volumes, inverse_h2, iteration):
+def project_volumes(work, masses, volumes, inverse_h2, iteration, forces):
     """Project every area or volume on its rest value (Mueller et al. 2007, eq. 10, 14 and 15).
 
     The content is signed: a body turned inside out has a negative one and turns back. A compliant
@@ -37,7 +38,8 @@ def project_volumes(work, masses, volumes, inverse_h2, iteration):
                 particle = particles[entry]
                 inverse_mass = inverse_mass_of(masses, particle)
                 _add_particle(row(work, particle), inverse_mass, origin, sums)
-            _solve(sums, rest[index], alpha * inverse_h2, least[index])
+            force = force_row(forces, VOLUMES, index)
+            _solve(sums, rest[index], alpha * inverse_h2, least[index], force)
             for entry in range(first, last):
                 particle = particles[entry]
                 _move(row(work, particle), inverse_mass_of(masses, particle), sums)
@@ -110,13 +112,14 @@ def _add_particle(at, mass, origin, sums):
 
 
 @kernel
-def _solve(sums, rest, alpha, least):
+def _solve(sums, rest, alpha, least, force):
     """Turn the sums into the multiplier; what is all but collapsed is not thrown apart."""
     zero = type(rest)(0)
     for lane in range(LANES):
         total = max(sums[STIFFNESS + lane], least) + alpha
         error = sums[CONTENT + lane] - rest
         sums[CONTENT + lane] = error / total if total > zero else zero
+        note(force, lane, -sums[CONTENT + lane])
 
 
 @kernel
