@@ -238,4 +238,7 @@ def test_a_swinging_rope_pulls_on_its_end_as_the_second_law_asks():
                 direction /= np.linalg.norm(direction, axis=1)[:, None]
                 pull = state.forces.ropes[:, link, None] * direction
                 gained = 0.2 * ((state.v[:, end] - before[:, end]) / H - DOWN)
-                np.testing.assert_allclose(pull, gained, atol=1e-2)
+                # what the first iteration leaves of the length goes with the square of a link's
+                # turn, w h = 4/s * h = 7e-3, and the second squares that: 2e-9 of some 5 N while
+                # it swings evenly, and up to 1e-7 N where it whips
+                np.testing.assert_allclose(pull, gained, atol=1e-6)
