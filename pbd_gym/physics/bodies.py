@@ -23,10 +23,14 @@ class Linkage:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A rectangular cloth: rows x columns of particle indices, and its half thickness [m]."""
+    """A rectangular cloth: rows x columns of particle indices, and its half thickness [m].
+
+    Cells in `holes` (row and column of the particle at which they begin) are missing.
+    """
 
     particles: tuple[tuple[int, ...], ...]
     radius: float
+    holes: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,8 @@ def _casters(
         cells = np.stack(
             [particles[:-1, :-1], particles[:-1, 1:], particles[1:, 1:], particles[1:, :-1]], axis=2
         ).reshape(-1, 4)
+        holes = [row * (particles.shape[1] - 1) + column for row, column in body.holes]
+        cells = np.delete(cells, holes, axis=0)
         return [(dropped[cells], height[cells].mean(axis=1))]
     if isinstance(body, Mesh):
         corners = np.array(body.triangles)[:, [0, 1, 2, 2]]

@@ -108,7 +108,7 @@ class SpatialPainter:
             points = x[particles_of(body)]
             pieces = 1 if ghost else max(1, round(_PATCHES / max(points.shape[:2])))
             sides = (fill, fill) if ghost else (palette.PALE_BLUE, palette.CLOTH_BLUE)
-            scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides))
+            scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides, body.holes))
         elif isinstance(body, Mesh):
             self._add_surface(scene, body, x, (fill, edge))
         elif isinstance(body, Linkage):

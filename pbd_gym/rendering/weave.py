@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ def weave(
     eye: np.ndarray,
     light: np.ndarray,
     sides: tuple[Colour, Colour],
+    holes: Sequence[tuple[int, int]] = (),
 ) -> Mesh:
     """Return the visible patches of a cloth, as the eye sees them lit.
 
@@ -38,14 +40,18 @@ def weave(
         light: Unit vector towards the lamp (3,).
         sides: Colours of the side on which rows, columns and normal are right-handed, and of the
             other.
+        holes: Row and column of cells that are left out; then nothing is smoothed, as a curve
+            would pull the two sides of a cut together.
     """
-    surface = smooth_sheet(points, pieces)
+    surface = points if len(holes) else smooth_sheet(points, pieces)
     pieces = 1 if surface is points else pieces
     patches = np.stack(
         [surface[:-1, :-1], surface[:-1, 1:], surface[1:, 1:], surface[1:, :-1]], axis=2
     ).reshape(-1, 4, 3)
     tone = _pattern(surface.shape[0] - 1, surface.shape[1] - 1, pieces)
     seen = np.isfinite(patches).all(axis=(1, 2))
+    for row, column in holes:
+        seen[row * (surface.shape[1] - 1) + column] = False
     patches, tone = patches[seen], tone[seen]
     normal = np.cross(patches[:, 2] - patches[:, 0], patches[:, 3] - patches[:, 1])
     return Mesh(patches, shade(patches, normal, tone, eye, light, sides))
