@@ -107,8 +107,8 @@ class Panel:
         """Show another integrator in the menu."""
         place = self.integrator.relative_rect
         self.integrator.kill()
-        options = [*INTEGRATORS.values()]
-        self.integrator = UIDropDownMenu(options, INTEGRATORS[name], place, self._manager)
+        words = INTEGRATORS[name]
+        self.integrator = UIDropDownMenu([*INTEGRATORS.values()], words, place, self._manager)
 
     def named(self, element: object) -> str | None:
         """Return the name of a button, or None for what is none."""
