@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -11,6 +12,7 @@ from pbd_gym.envs.arguments import as_dict, make_task
 from pbd_gym.envs.observations import world_of
 from pbd_gym.envs.pictures import RENDER_MODES, Pictures
 from pbd_gym.envs.state import EpisodeState, check_state
+from pbd_gym.rendering import Viewpoint
 from pbd_gym.tasks import Batch, Task
 
 
@@ -21,6 +23,10 @@ class PBDEnv(gymnasium.Env[Any, np.ndarray]):
         task: Task class, or its place "module:Class".
         render_mode: None, "rgb_array" or "human".
         render_size: Width and height of a frame [pixels].
+        camera: "default", "front", "side", "top" or a `pbd_gym.rendering.Viewpoint`.
+        color: "material", or "strain" with a legend in percent.
+        theme: "light" or "dark".
+        show: Any of "scale", "clock" and "trail".
         **arguments: The task's configuration, see its class.
 
     Raises:
@@ -37,10 +43,16 @@ class PBDEnv(gymnasium.Env[Any, np.ndarray]):
         *,
         render_mode: str | None = None,
         render_size: tuple[int, int] = (512, 512),
+        camera: str | Viewpoint = "default",
+        color: str = "material",
+        theme: str = "light",
+        show: Sequence[str] = ("scale",),
         **arguments: Any,
     ) -> None:
         self.task = make_task(task, arguments)
-        self._pictures = Pictures(self.task, render_mode, render_size)
+        self._pictures = Pictures(
+            self.task, 1, render_mode, render_size, camera, color, theme, show
+        )
         self.render_mode = render_mode
         self.metadata = {**type(self).metadata, "render_fps": self._pictures.fps}
         self.metadata["render_modes"] = list(RENDER_MODES)
@@ -61,6 +73,7 @@ class PBDEnv(gymnasium.Env[Any, np.ndarray]):
         super().reset(seed=seed)
         self._batch.reset(np.zeros(1, dtype=np.int64), [self.np_random], fixed)
         self._begun = True
+        self._pictures.begin(np.zeros(1, dtype=np.int64), self._batch)
         if self.render_mode == "human":
             self.render()
         return world_of(self._batch.observe(), 0), {}
@@ -76,6 +89,7 @@ class PBDEnv(gymnasium.Env[Any, np.ndarray]):
         if not self._begun:
             raise RuntimeError("step was called before reset: call reset() first")
         outcome = self._batch.step(np.asarray(action)[None])
+        self._pictures.advance(self._batch)
         if self.render_mode == "human":
             self.render()
         info = {name: values.item() for name, values in outcome.info.items()}
@@ -123,3 +137,4 @@ class PBDEnv(gymnasium.Env[Any, np.ndarray]):
         self._batch.set_state((state.worlds, state.variables))
         self.np_random.bit_generator.state = state.generators[0]
         self._begun = bool(state.begun[0])
+        self._pictures.begin(np.zeros(1, dtype=np.int64), self._batch)

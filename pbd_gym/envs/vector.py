@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -14,6 +15,7 @@ from pbd_gym.envs.arguments import as_dict, make_task
 from pbd_gym.envs.observations import replace, world_of
 from pbd_gym.envs.pictures import Pictures
 from pbd_gym.envs.state import EpisodeState, check_state
+from pbd_gym.rendering import Viewpoint
 from pbd_gym.tasks import Batch, Task
 
 
@@ -30,6 +32,10 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         autoreset_mode: NEXT_STEP, SAME_STEP or DISABLED, as an `AutoresetMode` or its name.
         render_mode: None or "rgb_array".
         render_size: Width and height of a frame [pixels].
+        camera: "default", "front", "side", "top" or a `pbd_gym.rendering.Viewpoint`.
+        color: "material", or "strain" with a legend in percent.
+        theme: "light" or "dark".
+        show: Any of "scale", "clock" and "trail".
         num_threads: Threads that share the worlds; chosen by the size of the batch where None.
         **arguments: The task's configuration, see its class.
 
@@ -50,6 +56,10 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         render_size: tuple[int, int] = (512, 512),
+        camera: str | Viewpoint = "default",
+        color: str = "material",
+        theme: str = "light",
+        show: Sequence[str] = ("scale",),
         num_threads: int | None = None,
         **arguments: Any,
     ) -> None:
@@ -59,7 +69,9 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         if max_episode_steps is not None:
             _check_count("max_episode_steps", max_episode_steps)
         self.task = make_task(task, arguments)
-        self._pictures = Pictures(self.task, render_mode, render_size)
+        self._pictures = Pictures(
+            self.task, num_envs, render_mode, render_size, camera, color, theme, show
+        )
         self.render_mode = render_mode
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
@@ -113,6 +125,7 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         self._elapsed[worlds] = 0
         self._ended[worlds] = False
         self._begun[worlds] = True
+        self._pictures.begin(worlds, self._batch)
 
     def _check_mask(self, mask: Any) -> np.ndarray:
         if mask is None:
@@ -164,6 +177,7 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
             )
         going = ~self._ended
         outcome = self._batch.step(actions)
+        self._pictures.advance(self._batch)
         if not going.all():  # NEXT_STEP: this step only begins those episodes
             self._begin(np.flatnonzero(~going), self._generators, {})
         self._elapsed += going
@@ -224,6 +238,7 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         self._elapsed = state.elapsed.copy()
         self._ended = state.ended.copy()
         self._begun = state.begun.copy()
+        self._pictures.begin(np.arange(self.num_envs), self._batch)
 
 
 def _infos(info: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:

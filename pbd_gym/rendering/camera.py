@@ -23,7 +23,12 @@ class OrthographicCamera:
 
     @classmethod
     def framing(
-        cls, lower: np.ndarray, upper: np.ndarray, size: tuple[int, int], margin: float
+        cls,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        size: tuple[int, int],
+        margin: float,
+        zoom: float = 1.0,
     ) -> OrthographicCamera:
         """Return the camera that shows a box as large as it fits.
 
@@ -32,9 +37,10 @@ class OrthographicCamera:
             upper: Upper corner of the box, (2,) [m].
             size: Width and height of the picture [pixels].
             margin: Share of the picture left free on every side.
+            zoom: How much larger than that.
         """
         free = np.array(size) * (1.0 - 2.0 * margin)
-        scale = float(np.min(free / (upper - lower)))
+        scale = zoom * float(np.min(free / (upper - lower)))
         return cls((lower + upper) / 2.0, np.array(size) / 2.0, scale)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,6 +85,7 @@ class PerspectiveCamera:
         margin: float,
         azimuth: float,
         elevation: float,
+        zoom: float = 1.0,
     ) -> PerspectiveCamera:
         """Return the camera that shows a box as large as it fits.
 
@@ -88,7 +95,8 @@ class PerspectiveCamera:
             size: Width and height of the picture [pixels].
             margin: Share of the picture left free on every side.
             azimuth: Direction in which the camera stands, seen from the box; 0 is x, pi/2 is y.
-            elevation: Angle of that direction above the horizon, below pi/2.
+            elevation: Angle of that direction above the horizon.
+            zoom: How much larger than that.
         """
         out = np.array(
             [
@@ -106,7 +114,7 @@ class PerspectiveCamera:
         local = (corners - eye) @ axes.T
         slopes = local[:, :2] / local[:, 2:]
         low, high = slopes.min(axis=0), slopes.max(axis=0)
-        focal = float(np.min(np.array(size) * (1.0 - 2.0 * margin) / (high - low)))
+        focal = zoom * float(np.min(np.array(size) * (1.0 - 2.0 * margin) / (high - low)))
         middle = np.array(size) / 2.0 - (low + high) / 2.0 * (focal, -focal)
         return cls(eye, axes, focal, middle, 0.2 * distance)
 

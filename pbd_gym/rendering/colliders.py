@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pbd_gym.physics.model import Model
-from pbd_gym.rendering.palette import Colour
-from pbd_gym.rendering.weave import shade
+from pbd_gym.rendering.weave import quads
 
-_PLANE, _BOX = 0, 1
+_PLANE, _BOX, CAPSULE = 0, 1, 2
 _RIM = 48  # corners around a disc
 _RINGS, _MERIDIANS = 14, 28  # patches of a ball
 _TILES = 8  # patches along an edge of a box or a plane
@@ -101,23 +100,6 @@ def patches(shape: Shape, centre: np.ndarray, reach: float) -> np.ndarray:
     return _round(shape)
 
 
-def lit(
-    corners: np.ndarray, eye: np.ndarray, light: np.ndarray, colour: Colour
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the patches that face the eye (Q, 4, 3) and their colours (Q, 3) in [0, 255].
-
-    Args:
-        corners: Patches (P, 4, 3) [m], anticlockwise as seen from outside.
-        eye: From where they are seen (3,) [m].
-        light: Unit vector towards the lamp (3,).
-        colour: Of the shape.
-    """
-    normal = _normals(corners)
-    seen = np.einsum("ij,ij->i", normal, eye - corners.mean(axis=1)) > 0.0
-    corners, normal = corners[seen], normal[seen]
-    return corners, shade(corners, normal, np.ones(len(normal)), eye, light, (colour, colour))
-
-
 def cast(model: Model, x: np.ndarray, light: np.ndarray) -> np.ndarray:
     """Return the lit patches (Q, 4, 3) [m] of all spatial shapes but planes, which cast shadows."""
     found = [np.zeros((0, 4, 3))]
@@ -134,16 +116,10 @@ def _normals(corners: np.ndarray) -> np.ndarray:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
 
 
-def _quads(surface: np.ndarray) -> np.ndarray:
-    """Return the cells (Q, 4, 3) of a grid of points (rows, columns, 3)."""
-    corners = [surface[:-1, :-1], surface[:-1, 1:], surface[1:, 1:], surface[1:, :-1]]
-    return np.stack(corners, axis=2).reshape(-1, 4, 3)
-
-
 def _square(edges: np.ndarray) -> np.ndarray:
     """Return the patches of a square from -edges to +edges (2, 3), anticlockwise."""
     steps = np.linspace(-1.0, 1.0, _TILES + 1)
-    return _quads(steps[:, None, None] * edges[1] + steps[:, None] * edges[0])
+    return quads(steps[:, None, None] * edges[1] + steps[:, None] * edges[0])
 
 
 def _round(shape: Shape) -> np.ndarray:
@@ -162,7 +138,7 @@ def _round(shape: Shape) -> np.ndarray:
     equator = _RINGS // 2
     lower, upper = shape.start + points[: equator + 1], shape.end + points[equator:]
     rods = [] if length == 0.0 else [_tube(lower[-1], upper[0])]
-    return np.concatenate([_quads(lower), *rods, _quads(upper)])
+    return np.concatenate([quads(lower), *rods, quads(upper)])
 
 
 def _tube(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -170,4 +146,4 @@ def _tube(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     width = float(np.linalg.norm(lower[1] - lower[0]))
     pieces = int(np.clip(np.linalg.norm(upper[0] - lower[0]) / width, 1.0, 40.0))
     share = np.linspace(0.0, 1.0, pieces + 1)[:, None, None]
-    return _quads(lower + share * (upper - lower))
+    return quads(lower + share * (upper - lower))

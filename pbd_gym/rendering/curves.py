@@ -62,8 +62,8 @@ def finite_rows(points: np.ndarray) -> np.ndarray:
     return np.asarray(np.isfinite(points).all(axis=1))
 
 
-def finite_runs(points: np.ndarray) -> list[np.ndarray]:
+def finite_spans(points: np.ndarray) -> list[slice]:
     """Return the stretches of points (M, dim), in order, in which all are finite."""
-    finite = finite_rows(points)
-    cuts = np.flatnonzero(np.diff(finite)) + 1
-    return [run for run in np.split(points, cuts) if finite_rows(run[:1]).any()]
+    finite = np.concatenate([[False], finite_rows(points), [False]])
+    edges = np.flatnonzero(finite[1:] != finite[:-1]).reshape(-1, 2)
+    return [slice(start, end) for start, end in edges.tolist()]

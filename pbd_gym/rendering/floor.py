@@ -2,10 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from pbd_gym.physics.tables import Room
 from pbd_gym.rendering.camera import PerspectiveCamera
-from pbd_gym.rendering.palette import FLOOR, FLOOR_TILE, PAPER, SKY
+from pbd_gym.rendering.canvas import Canvas
+from pbd_gym.rendering.look import Look
+from pbd_gym.rendering.marks import WRITING
+from pbd_gym.rendering.palette import Theme
+from pbd_gym.rendering.scene import Segment, round_length
+
+_TIMES = 3  # samples along a side of a pixel
+
+
+def paint_floor(
+    canvas: Canvas,
+    camera: PerspectiveCamera,
+    view: tuple[np.ndarray, np.ndarray],
+    room: Room,
+    rails: tuple[Segment, ...],
+    look: Look,
+) -> None:
+    """Draw what does not move and keep it as the background."""
+    theme = look.colours
+    tile = round_length(float(np.max(view[1] - view[0])) / 6.0)
+    width, height = canvas.size
+    fine = replace(camera, focal_length=camera.focal_length * _TIMES, middle=camera.middle * _TIMES)
+    size = (width * _TIMES, height * _TIMES)
+    pixels = floor_pixels(fine, size, view, (room.lower, room.upper), tile, theme)
+    samples = pixels.reshape(height, _TIMES, width, _TIMES, 3)
+    mean = np.rint(samples.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
+    canvas.paste(mean)
+    for rail in rails:
+        ends, _ = camera.project(np.array(rail, dtype=np.float64))
+        canvas.stroke(ends, 4.0 * canvas.unit, theme.light_steel)
+    if np.isfinite(room.lower[2]) and "scale" in look.show:
+        words, u = f"tile {tile:g} m", canvas.unit
+        columns, rows = canvas.text_size(words, WRITING * u)
+        place = (14.0 * u + columns / 2.0, canvas.size[1] - 12.0 * u - rows / 2.0)
+        canvas.text(words, place, WRITING * u, theme.ink)
+    canvas.keep_as_background()
 
 
 def floor_pixels(
@@ -14,6 +52,7 @@ def floor_pixels(
     view: tuple[np.ndarray, np.ndarray],
     room: tuple[np.ndarray, np.ndarray],
     tile: float,
+    theme: Theme,
 ) -> np.ndarray:
     """Return what the camera sees of an empty scene, (height, width, 3) of uint8.
 
@@ -24,9 +63,10 @@ def floor_pixels(
         room: Lower and upper walls (3,) [m]; the floor lies at the lower end of z, if it is finite,
             and ends at the others.
         tile: Side of a tile [m].
+        theme: Its colours.
     """
     width, height = size
-    sky = np.linspace(SKY, PAPER, height)[:, None, :]
+    sky = np.linspace(theme.sky, theme.paper, height)[:, None, :]
     lower, upper = room
     if not np.isfinite(lower[2]):
         return np.broadcast_to(np.rint(sky), (height, width, 3)).astype(np.uint8)
@@ -55,6 +95,7 @@ def floor_pixels(
     pixels = np.empty((height, width, 3), dtype=np.uint8)
     for channel in range(3):
         air = sky[..., channel].astype(np.float32)
-        ground = np.where(even, np.float32(FLOOR[channel]), np.float32(FLOOR_TILE[channel]))
+        tones = np.float32(theme.floor[channel]), np.float32(theme.floor_tile[channel])
+        ground = np.where(even, *tones)
         pixels[..., channel] = np.rint(air + (ground - air) * opacity)
     return pixels

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,14 +11,15 @@ import numpy as np
 
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering.canvas import Canvas
+from pbd_gym.rendering.look import Look, Viewpoint
+from pbd_gym.rendering.marks import paint_clock
 from pbd_gym.rendering.planar import PlanarPainter
-from pbd_gym.rendering.scene import Segment
+from pbd_gym.rendering.scene import Segment, tips
 from pbd_gym.rendering.spatial import SpatialPainter
+from pbd_gym.rendering.strain import Strains, paint_legend
 
 if TYPE_CHECKING:
     import pygame
-
-MIN_SIZE = 32  # [pixels]; nothing can be told apart on less
 
 
 class Renderer:
@@ -33,9 +34,20 @@ class Renderer:
         view: Lower and upper corner of the box to frame, (dim,) each [m].
         size: Width and height of the picture [pixels], even numbers of at least 32.
         rails: Pairs of points (dim,) [m] between which pins are guided, drawn as rails.
+        camera: "default", "front", "side", "top" or a `Viewpoint`.
+        color: "material", or "strain": how much longer or shorter every link is than it shall be,
+            from blue to red, with a legend in percent.
+        theme: "light" or "dark".
+        show: Any of "scale", "clock" and "trail"; the last two are drawn if `draw` is told them.
 
     Raises:
-        ValueError: If the size, the view or a rail cannot be drawn.
+        ValueError: For anything that cannot be drawn.
+
+    Attributes:
+        model: As given.
+        look: Size, camera, colours and what is shown.
+        tips: Free ends of ropes and pendulums and free corners of cloths, (K,): whose trail is
+            worth showing.
     """
 
     def __init__(
@@ -45,20 +57,38 @@ class Renderer:
         *,
         size: tuple[int, int] = (512, 512),
         rails: Sequence[Segment] = (),
+        camera: str | Viewpoint = "default",
+        color: str = "material",
+        theme: str = "light",
+        show: Sequence[str] = ("scale",),
     ) -> None:
         self.model = model
-        self.size = check_size(size)
+        self.look = Look(size, camera, color, theme, show)
+        self.size = self.look.size
+        self.tips = tips(model)
         self._view = _check_view(view, model.dim)
         self._rails = tuple(_check_rail(rail, model.dim) for rail in rails)
+        self._strains = Strains(model, theme) if color == "strain" else None
         self._canvas: Canvas | None = None
         self._painter: PlanarPainter | SpatialPainter | None = None
+        self._goal: tuple[bytes, float] = (b"", 0.0)
+        self._with_goal = np.zeros((0, 0, 3), dtype=np.uint8)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Surfaces cannot be pickled or copied; they are painted anew when first needed.
-        make = partial(Renderer, size=self.size, rails=self._rails)
+        # Pictures need not be pickled or copied; they are painted anew when first needed.
+        look = {spec.name: getattr(self.look, spec.name) for spec in fields(self.look)}
+        make = partial(Renderer, rails=self._rails, **look)
         return make, (self.model, self._view)
 
-    def draw(self, x: Any, goal: Any = None, goal_radius: float = 0.0) -> np.ndarray:
+    def draw(
+        self,
+        x: Any,
+        goal: Any = None,
+        goal_radius: float = 0.0,
+        *,
+        time: float | None = None,
+        trail: Any = None,
+    ) -> np.ndarray:
         """Draw one state.
 
         Args:
@@ -67,6 +97,9 @@ class Renderer:
                 with a goal for each of its particles is drawn translucent there, other goals as
                 translucent discs.
             goal_radius: How near to its goal a particle counts as arrived [m].
+            time: On the clock, if one is shown [s].
+            trail: Where some points were, (T, K, dim) [m] from the oldest on, NaN where the trail
+                is broken; drawn if trails are shown.
 
         Returns:
             A fresh C-contiguous array (height, width, 3) of uint8.
@@ -74,42 +107,54 @@ class Renderer:
         Raises:
             ValueError: If a shape does not fit the model or the radius is negative or not finite.
         """
-        return self._paint(x, goal, goal_radius).frame()
+        return self._paint(x, goal, goal_radius, time, trail).frame()
 
-    def draw_on(self, surface: pygame.Surface, x: Any) -> None:
-        """Draw one state on a pygame surface of the renderer's size: faster than `draw`.
+    def draw_on(
+        self,
+        surface: pygame.Surface,
+        x: Any,
+        goal: Any = None,
+        goal_radius: float = 0.0,
+        *,
+        time: float | None = None,
+        trail: Any = None,
+    ) -> None:
+        """Draw one state on a pygame surface of the renderer's size and of any format.
 
-        Args:
-            surface: Of any format.
-            x: Positions (N, dim) [m].
+        The other arguments are those of `draw`.
 
         Raises:
             ValueError: If a shape does not fit.
         """
         if surface.get_size() != self.size:
             raise ValueError(f"surface has size {surface.get_size()}; the picture has {self.size}")
-        self._paint(x, None, 0.0).show_on(surface)
+        self._paint(x, goal, goal_radius, time, trail).show_on(surface)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return where points (M, dim) [m] are seen: pixels (M, 2), and their depths (M,) [m]."""
-        canvas, painter = self._ready()
-        pixels, depths = painter.camera.project(points)
-        return pixels * (self.size[0] / canvas.size[0]), depths
+        return self._ready()[1].camera.project(points)
 
     def unproject(self, pixels: np.ndarray, depths: np.ndarray) -> np.ndarray:
         """Return the points (M, dim) [m] that are seen at pixels (M, 2), at depths (M,) [m]."""
-        canvas, painter = self._ready()
-        return painter.camera.unproject(pixels * (canvas.size[0] / self.size[0]), depths)
+        return self._ready()[1].camera.unproject(pixels, depths)
 
-    def _paint(self, x: Any, goal: Any, goal_radius: float) -> Canvas:
+    def _paint(
+        self, x: Any, goal: Any, goal_radius: float, time: float | None, trail: Any
+    ) -> Canvas:
         """Draw one state on the canvas."""
         points = self._visible("x", x)
         targets = None if goal is None else self._visible("goal", goal)
         if not (np.isfinite(goal_radius) and goal_radius >= 0.0):
             raise ValueError(f"goal_radius is {goal_radius!r}; it must be finite and at least 0")
         canvas, painter = self._ready()
-        canvas.clear()
-        painter.paint(points, targets, float(goal_radius))
+        self._begin(canvas, painter, targets, float(goal_radius))
+        shown = self.look.show
+        past = self._past(trail) if "trail" in shown and trail is not None else None
+        painter.paint(points, targets, past)
+        if self._strains is not None:
+            paint_legend(canvas, self._strains, self.look.colours)
+        if "clock" in shown and time is not None:
+            paint_clock(canvas, time, self.look.colours)
         return canvas
 
     def _ready(self) -> tuple[Canvas, PlanarPainter | SpatialPainter]:
@@ -117,8 +162,27 @@ class Renderer:
         if self._canvas is None or self._painter is None:
             self._canvas = Canvas(self.size)
             painter = PlanarPainter if self.model.dim == 2 else SpatialPainter
-            self._painter = painter(self.model, self._view, self._canvas, self._rails)
+            self._painter = painter(
+                self.model, self._view, self._canvas, self._rails, self.look, self._strains
+            )
         return self._canvas, self._painter
+
+    def _begin(
+        self,
+        canvas: Canvas,
+        painter: PlanarPainter | SpatialPainter,
+        goal: np.ndarray | None,
+        goal_radius: float,
+    ) -> None:
+        """Start a picture with the goal, which seldom changes: the last one is kept."""
+        if goal is None:
+            canvas.clear()
+            return
+        if (goal.tobytes(), goal_radius) != self._goal:
+            canvas.clear()
+            painter.paint_goal(goal, goal_radius)
+            self._goal, self._with_goal = (goal.tobytes(), goal_radius), canvas.frame()
+        canvas.paste(self._with_goal)
 
     def _visible(self, name: str, points: Any) -> np.ndarray:
         """Return points as float64, NaN for those that no picture can show."""
@@ -126,28 +190,22 @@ class Renderer:
         shape = (len(self.model.inverse_mass), self.model.dim)
         if array.shape != shape:
             raise ValueError(f"{name} has shape {array.shape}; the model needs {shape}")
-        # Pixel coordinates of particles that flew off must still fit pygame's integers.
+        return self._near(array)
+
+    def _past(self, trail: Any) -> np.ndarray:
+        """Return a trail as float64."""
+        array = np.array(trail, dtype=np.float64)
+        if array.ndim != 3 or array.shape[2] != self.model.dim:
+            raise ValueError(f"trail has shape {array.shape}; expected (T, K, {self.model.dim})")
+        return self._near(array.reshape(-1, self.model.dim)).reshape(array.shape)
+
+    def _near(self, points: np.ndarray) -> np.ndarray:
+        """Put NaN for points (M, dim) that flew off, whose pixels no picture counts."""
         lower, upper = self._view
         reach = 10.0 * float(np.max(upper - lower))
-        near = (array > lower - reach) & (array < upper + reach)
-        array[~near.all(axis=1)] = np.nan
-        return array
-
-
-def check_size(size: Any) -> tuple[int, int]:
-    """Return a picture's width and height as integers.
-
-    Raises:
-        ValueError: If it is not a pair of integers, or a side is odd or too small.
-    """
-    try:
-        width, height = (operator.index(side) for side in size)
-    except (TypeError, ValueError):
-        raise ValueError(f"size is {size!r}; it must be two integers, width and height") from None
-    for side in (width, height):
-        if side % 2 or side < MIN_SIZE:
-            raise ValueError(f"size is {size!r}; sides must be even and at least {MIN_SIZE} pixels")
-    return width, height
+        near = (points > lower - reach) & (points < upper + reach)
+        points[~near.all(axis=1)] = np.nan
+        return points
 
 
 def _check_view(view: Any, dim: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,12 +8,12 @@ from pbd_gym.physics.bodies import Balls, Body, Linkage, Mesh, Net, Sheet, Stran
 from pbd_gym.physics.model import Model
 from pbd_gym.rendering.canvas import ribbon
 from pbd_gym.rendering.colliders import cast
-from pbd_gym.rendering.curves import finite_runs
+from pbd_gym.rendering.curves import finite_spans
 from pbd_gym.rendering.scene import bob_radius, particles_of
 
 
 def shadow_patches(model: Model, x: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the shadows that a lamp far away casts on the floor, the darkest last.
+    """Return the shadows that a lamp far away casts on the floor.
 
     Args:
         model: Whose bodies cast them; its floor must be finite.
@@ -33,9 +33,8 @@ def shadow_patches(model: Model, x: np.ndarray, light: np.ndarray) -> tuple[np.n
             patches.append(corners)
             heights.append(high)
     corners, high = np.concatenate(patches), np.concatenate(heights)
-    order = np.argsort(-high, kind="stable")
-    order = order[np.isfinite(corners[order]).all(axis=(1, 2))]
-    return corners[order], high[order]
+    seen = np.isfinite(corners).all(axis=(1, 2))
+    return corners[seen], high[seen]
 
 
 def _drop(points: np.ndarray, light: np.ndarray, floor: float) -> tuple[np.ndarray, np.ndarray]:
@@ -68,21 +67,26 @@ def _casters(
         corners = np.array(body.triangles)[:, [0, 1, 2, 2]]
         return [(dropped[corners], height[corners].mean(axis=1))]
     if isinstance(body, Balls):
-        return [_under_ball(dropped[p], float(height[p]), body.radius) for p in particles]
+        radii = np.full(len(particles), body.radius)
+        return [_under_balls(dropped[particles], height[particles], radii)]
     casters = []
-    for run in finite_runs(np.column_stack([dropped[particles], height[particles]])):
+    line = np.column_stack([dropped[particles], height[particles]])
+    for run in (line[span] for span in finite_spans(line)):
         flat = ribbon(run[:, :2], 2.0 * body.radius)
         floor = np.broadcast_to(run[0, 2], (*flat.shape[:2], 1))
         high = (run[1:, 3] + run[:-1, 3]) / 2.0
         casters.append((np.concatenate([flat, floor], axis=2), high))
     if isinstance(body, Linkage):
-        bobs = zip(particles, bob_radius(model, body), strict=True)
-        casters += [_under_ball(dropped[p], float(height[p]), radius) for p, radius in bobs]
+        radii = bob_radius(model, body)
+        casters.append(_under_balls(dropped[particles], height[particles], radii))
     return casters
 
 
-def _under_ball(dropped: np.ndarray, height: float, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return two crossed squares, which pass for a disc once they are blurred."""
+def _under_balls(
+    dropped: np.ndarray, height: np.ndarray, radii: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return two crossed squares under each ball, which pass for a disc once they are blurred."""
     angles = np.radians([[0, 90, 180, 270], [45, 135, 225, 315]])
     rim = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=2)
-    return dropped + radius * rim, np.full(2, height)
+    squares = dropped[:, None, None] + radii[:, None, None, None] * rim
+    return squares.reshape(-1, 4, 3), np.repeat(height, 2)

@@ -6,37 +6,36 @@ import numpy as np
 
 from pbd_gym.physics.bodies import Balls, Body, Linkage, Mesh, Net, Polygon, Sheet, Strand
 from pbd_gym.physics.model import Model
-from pbd_gym.rendering import palette
 from pbd_gym.rendering.camera import PerspectiveCamera
 from pbd_gym.rendering.canvas import Canvas
-from pbd_gym.rendering.colliders import lit, patches, placed
-from pbd_gym.rendering.curves import finite_runs, smooth_line
-from pbd_gym.rendering.display_list import DisplayList
-from pbd_gym.rendering.floor import floor_pixels
-from pbd_gym.rendering.marks import GHOST, paint_target
+from pbd_gym.rendering.colliders import CAPSULE, patches, placed
+from pbd_gym.rendering.curves import finite_rows, finite_spans, smooth_line
+from pbd_gym.rendering.depths import Depths
+from pbd_gym.rendering.floor import paint_floor
+from pbd_gym.rendering.look import Look
+from pbd_gym.rendering.marks import BEAD, GHOST, gripper_lines, paint_target, paint_trail
 from pbd_gym.rendering.palette import Colour
 from pbd_gym.rendering.scene import (
     Segment,
+    ball_radius,
     bob_radius,
     grippers,
+    loose_links,
     loose_particles,
     particles_of,
-    round_length,
+    payload_radius,
     split_goals,
     threads_of,
 )
 from pbd_gym.rendering.shadow import shadow_patches
+from pbd_gym.rendering.strain import Strains
 from pbd_gym.rendering.weave import shade, weave
 
-Tones = tuple[Colour, Colour]  # of a body and of its edge or inside
-
 _MARGIN = 0.03
-_AZIMUTH, _ELEVATION = float(np.radians(-62.0)), float(np.radians(32.0))
 _LIGHT = np.array([-0.45, -0.35, 1.0]) / np.linalg.norm([-0.45, -0.35, 1.0])  # towards the lamp
-_SOLID = (palette.BLUE, palette.DARK_BLUE)  # fill and edge of what is there
-_GHOSTLY = (palette.ORANGE, palette.DARK_ORANGE)  # and of what shall be there
-_DARKEST = 0.42  # opacity of a shadow that its body touches
-_PATCHES = 24  # a cloth is drawn with about this many patches along each side
+_PATCHES = 33  # a cloth is drawn with about this many patches along each side
+_PIECES = 3  # of the curve between two particles
+_CREASE = 0.8  # cosine of the angle to its facets from which on a corner is smooth
 
 
 class SpatialPainter:
@@ -47,6 +46,8 @@ class SpatialPainter:
         view: Two corners (3,) of the box to frame [m].
         canvas: On which it is drawn.
         rails: Segments along which pins are guided [m].
+        look: How it looks.
+        strains: Colours of strains, or None where bodies have the colours of their material.
     """
 
     def __init__(
@@ -55,145 +56,196 @@ class SpatialPainter:
         view: tuple[np.ndarray, np.ndarray],
         canvas: Canvas,
         rails: tuple[Segment, ...],
+        look: Look,
+        strains: Strains | None,
     ) -> None:
         self._model = model
         self._canvas = canvas
+        self._theme = look.colours
+        self._strains = strains
         self._extent = float(np.max(view[1] - view[0]))
         self._centre = (view[0] + view[1]) / 2.0
-        self.camera = PerspectiveCamera.framing(*view, canvas.size, _MARGIN, _AZIMUTH, _ELEVATION)
-        self._paint_background(view, rails)
+        stand = look.viewpoint
+        azimuth, elevation = np.radians(stand.azimuth), np.radians(stand.elevation)
+        self.camera = PerspectiveCamera.framing(
+            *view, canvas.size, _MARGIN, azimuth, elevation, stand.zoom
+        )
+        self._scene = Depths(canvas, self.camera, _LIGHT)
+        self._loose, self._links = loose_particles(model), loose_links(model)
+        paint_floor(canvas, self.camera, view, model.room, rails, look)
 
-    def paint(self, x: np.ndarray, goal: np.ndarray | None, goal_radius: float) -> None:
-        """Draw positions (N, 3) and goals (N, 3) [m]; what is not finite is left out."""
+    def paint_goal(self, goal: np.ndarray, goal_radius: float) -> None:
+        """Draw goals (N, 3) [m]: translucent bodies, and discs where single particles shall go."""
+        bodies, singles = split_goals(self._model, goal)
+        for body in bodies:
+            self._add_body(body, goal, solid=False)
+        self._scene.lay(GHOST)
+        for body in bodies:
+            if isinstance(body, Sheet):
+                self._paint_rim(body, goal)
+        for centre in goal[singles]:
+            self._paint_goal(centre, goal_radius)
+
+    def paint(self, x: np.ndarray, goal: np.ndarray | None, trail: np.ndarray | None) -> None:
+        """Draw positions (N, 3) and trails (T, K, 3) [m]; what is not finite is left out.
+
+        What covers the goal (N, 3) of a cloth lets its rim shine through.
+        """
         model = self._model
         bodies, singles = split_goals(model, goal)
-        sheets = [body for body in bodies if isinstance(body, Sheet)]
-        if goal is not None:
-            for body in bodies:
-                self._paint_ghost(body, goal)
-            for sheet in sheets:
-                self._paint_rim(sheet, goal)
-            for centre in goal[singles]:
-                self._paint_goal(centre, goal_radius)
         if np.isfinite(model.room.lower[2]):
             self._paint_shadows(x)
-        self._paint_bodies(x, singles)
+        for points in () if trail is None else trail.swapaxes(0, 1):
+            paint_trail(self._canvas, self.camera.project(points)[0], self._theme)
+        self._add_everything(x, singles)
+        self._scene.lay()
         if goal is not None:
-            for sheet in sheets:
+            for sheet in (body for body in bodies if isinstance(body, Sheet)):
                 pixels, _ = self.camera.project(goal[particles_of(sheet).ravel()])
                 with self._canvas.translucent(0.4, pixels, 4.0 * self._canvas.unit):
                     self._paint_rim(sheet, goal)
 
-    def _paint_bodies(self, x: np.ndarray, with_goal: np.ndarray) -> None:
-        scene = DisplayList(self._canvas, self.camera)
-        for shape in placed(self._model, x):
-            corners = patches(shape, self._centre, 0.5 * self._extent)
-            # what lies upon a shape may be drawn in patches that reach below it
-            edge = float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1).max())
-            scene.add_mesh(*lit(corners, self.camera.eye, _LIGHT, palette.LIGHT_STEEL), edge)
+    def _add_everything(self, x: np.ndarray, with_goal: np.ndarray) -> None:
+        theme, scene = self._theme, self._scene
+        self._add_colliders(x)
         for body in self._model.bodies:
-            self._add_body(scene, body, x, ghost=False)
-        for point in x[loose_particles(self._model)]:
-            scene.add_ball(point, 0.0, *_SOLID)
-        for point in x[with_goal]:
-            scene.add_ball(point, 0.0, *_GHOSTLY)
+            self._add_body(body, x, solid=True)
+        self._add_links(self._links, 0.0, x, theme.steel, solid=True)
+        for particles, colour in ((self._loose, theme.body), (with_goal, theme.goal)):
+            scene.add_balls(x[particles], ball_radius(self._model, particles), colour, BEAD)
         for point in x[grippers(self._model)]:
-            scene.add_gripper(point)
-        scene.draw()
+            scene.add_marks(point, *gripper_lines(self._canvas.unit, theme))
 
-    def _add_body(self, scene: DisplayList, body: Body, x: np.ndarray, *, ghost: bool) -> None:
-        """Add a body at positions (N, 3) [m], or the ghost that shows where it shall go."""
-        fill, edge = _GHOSTLY if ghost else _SOLID
+    def _add_colliders(self, x: np.ndarray) -> None:
+        colour = np.array(self._theme.light_steel, dtype=np.float64)
+        for shape in placed(self._model, x):
+            # What lies upon a shape is drawn between its particles, where it may reach below it.
+            if shape.kind == CAPSULE:
+                radius = float(shape.size[0])
+                ends = np.stack([shape.start, shape.end])[None]
+                self._scene.add_lines(ends, radius, colour, behind=0.08 * radius)
+                continue
+            corners = patches(shape, self._centre, 0.5 * self._extent)
+            edge = float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1).max())
+            normals = _facets(corners)[:, None]
+            lit = shade(corners, normals, self.camera.eye, _LIGHT, (colour, colour))
+            self._scene.add_mesh(corners, np.broadcast_to(lit, corners.shape), 0.5 * edge)
+
+    def _add_body(self, body: Body, x: np.ndarray, *, solid: bool) -> None:
+        """Add a body at positions (N, 3) [m], or (not solid) the ghost of where it shall go."""
+        theme = self._theme
+        fill = theme.body if solid else theme.goal
         if isinstance(body, Sheet):
-            points = x[particles_of(body)]
-            pieces = 1 if ghost else max(1, round(_PATCHES / max(points.shape[:2])))
-            sides = (fill, fill) if ghost else (palette.PALE_BLUE, palette.CLOTH_BLUE)
-            scene.add_mesh(*weave(points, pieces, self.camera.eye, _LIGHT, sides, body.holes))
+            self._add_sheet(body, x, solid=solid)
         elif isinstance(body, Mesh):
-            self._add_surface(scene, body, x, (fill, edge))
-        elif isinstance(body, Linkage):
-            self._add_linkage(scene, body, x, (fill, edge))
+            self._add_surface(body, x, fill, solid=solid)
+        elif isinstance(body, Net):
+            self._add_links(threads_of(body), body.radius, x, fill, solid=solid)
         elif isinstance(body, Balls):
-            for point in x[particles_of(body)]:
-                scene.add_ball(point, body.radius, fill, edge)
+            particles = particles_of(body)
+            radii = np.full(len(particles), body.radius)
+            self._scene.add_balls(x[particles], radii, fill, 1.0)
+        elif isinstance(body, Linkage):
+            particles, radii = particles_of(body), bob_radius(self._model, body)
+            self._add_row(particles, body.radius, x, theme.steel, 1, solid=solid)
+            bobs = radii > 0.0
+            self._scene.add_balls(x[particles[bobs]], radii[bobs], fill, 4.0)
         else:
-            self._add_lines(scene, body, x, (fill, edge))
+            particles = particles_of(body)
+            around = particles[:1] if isinstance(body, Polygon) else particles[:0]
+            row = np.concatenate([particles, around])
+            self._add_row(row, body.radius, x, fill, _PIECES, solid=solid)
+            load = payload_radius(self._model, body) if isinstance(body, Strand) else 0.0
+            if load > 0.0:
+                self._scene.add_balls(x[particles[-1:]], np.array([load]), fill, 4.0)
 
-    def _add_lines(
-        self, scene: DisplayList, body: Strand | Polygon | Net, x: np.ndarray, tones: Tones
+    def _add_links(
+        self, links: np.ndarray, radius: float, x: np.ndarray, fill: Colour, *, solid: bool
     ) -> None:
-        """Add lines through particles; those of a net are straight."""
-        if isinstance(body, Net):
-            runs = [run for thread in threads_of(body) for run in finite_runs(x[thread])]
+        """Add straight round lines between particles (M, 2)."""
+        colours: Colour | np.ndarray = fill
+        if self._strains is not None and solid:
+            colours = self._strains.colours(self._strains.of_pairs(links, x))
+        self._scene.add_lines(x[links], radius, colours)
+
+    def _add_row(
+        self,
+        row: np.ndarray,
+        radius: float,
+        x: np.ndarray,
+        fill: Colour,
+        pieces: int,
+        *,
+        solid: bool,
+    ) -> None:
+        """Add a round line through particles (M,) in a row."""
+        for span in finite_spans(x[row]):
+            line = smooth_line(x[row[span]], pieces)
+            colours = np.broadcast_to(np.array(fill, dtype=np.float64), (len(line) - 1, 3))
+            links = max(span.stop - span.start - 1, 1)
+            if self._strains is not None and solid:
+                strained = self._strains.of_row(row[span], x)
+                colours = np.repeat(strained, (len(line) - 1) // links, axis=0)
+            self._scene.add_lines(np.stack([line[:-1], line[1:]], axis=1), radius, colours)
+
+    def _add_sheet(self, sheet: Sheet, x: np.ndarray, *, solid: bool) -> None:
+        points = x[particles_of(sheet)]
+        pieces = max(1, round(_PATCHES / max(points.shape[:2]))) if solid else 1
+        if not solid:
+            front = back = np.array(self._theme.goal, dtype=np.float64)
+        elif self._strains is not None:
+            strain = self._strains.of_grid(particles_of(sheet), x)
+            front = back = self._strains.colours(strain)
         else:
-            points = x[particles_of(body)]
-            closed = points[:1] if isinstance(body, Polygon) else points[:0]
-            around = finite_runs(np.concatenate([points, closed]))
-            runs = [smooth_line(run, 3) for run in around]
-        for run in runs:
-            scene.add_line(run, body.radius, *tones)
+            front, back = (np.array(side, float) for side in (self._theme.front, self._theme.back))
+        eye, sides = self.camera.eye, (front, back)
+        self._scene.add_mesh(*weave(points, pieces, eye, _LIGHT, sides, sheet.holes))
 
-    def _add_linkage(self, scene: DisplayList, body: Linkage, x: np.ndarray, tones: Tones) -> None:
-        """Add rods and the bobs between them."""
-        points = x[particles_of(body)]
-        for run in finite_runs(points):
-            scene.add_line(run, body.radius, palette.STEEL, palette.DARK_STEEL)
-        for point, radius in zip(points, bob_radius(self._model, body), strict=True):
-            if radius > 0.0:
-                scene.add_ball(point, radius, *tones)
-
-    def _add_surface(self, scene: DisplayList, body: Mesh, x: np.ndarray, sides: Tones) -> None:
-        """Add the triangles of a body; its inside, where one looks in, has the second colour."""
-        corners = x[np.array(body.triangles)]
-        corners = corners[np.isfinite(corners).all(axis=(1, 2))]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        tone = np.ones(len(corners))
-        scene.add_mesh(corners, shade(corners, normal, tone, self.camera.eye, _LIGHT, sides))
-
-    def _paint_ghost(self, body: Body, goal: np.ndarray) -> None:
-        """Draw a body where all its particles shall go."""
-        scene = DisplayList(self._canvas, self.camera)
-        self._add_body(scene, body, goal, ghost=True)
-        pixels, depth = self.camera.project(goal[particles_of(body).ravel()])
-        bob = float(bob_radius(self._model, body).max()) if isinstance(body, Linkage) else 0.0
-        pad = 20.0 * self._canvas.unit + bob * self.camera.scale(float(depth.min()))
-        with self._canvas.translucent(GHOST, pixels, pad):
-            scene.draw()
+    def _add_surface(self, body: Mesh, x: np.ndarray, fill: Colour, *, solid: bool) -> None:
+        """Add the triangles of a body, rounded where they meet at a small angle."""
+        triangles = np.array(body.triangles)
+        triangles = triangles[np.isfinite(x[triangles]).all(axis=(1, 2))]
+        corners = x[triangles]
+        facet = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        around = np.zeros_like(x)
+        np.add.at(around, triangles, facet[:, None])
+        around /= np.maximum(np.linalg.norm(around, axis=1, keepdims=True), 1e-12)
+        facet /= np.maximum(np.linalg.norm(facet, axis=1, keepdims=True), 1e-12)
+        smooth = around[triangles]
+        flat = np.einsum("tkd,td->tk", smooth, facet)[:, :, None] < _CREASE
+        normals = np.where(flat, facet[:, None], smooth)
+        colour = np.array(fill, dtype=np.float64)
+        if self._strains is not None and solid:
+            colour = self._strains.colours(self._strains.of_particles(x)[triangles])
+        colours = shade(corners, normals, self.camera.eye, _LIGHT, (colour, colour))
+        quads = [0, 1, 2, 2]
+        self._scene.add_mesh(corners[:, quads], colours[:, quads])
 
     def _paint_rim(self, sheet: Sheet, goal: np.ndarray) -> None:
-        """Draw the rim of a cloth's goal; over the cloth it makes what is covered shine through."""
+        """Draw the rim of a cloth's goal."""
         grid = particles_of(sheet)
         rim = np.concatenate([grid[0], grid[1:, -1], grid[-1, -2::-1], grid[-2::-1, 0]])
         pixels, _ = self.camera.project(goal[rim])
-        for run in finite_runs(pixels):
-            self._canvas.stroke(run, 1.6 * self._canvas.unit, palette.DARK_ORANGE)
+        for span in finite_spans(pixels):
+            width = max(1.6 * self._canvas.unit, 1.0)
+            self._canvas.stroke(pixels[span], width, self._theme.goal_edge)
 
     def _paint_goal(self, centre: np.ndarray, goal_radius: float) -> None:
         """Draw where a single particle shall go: the ball around it, seen from anywhere a disc."""
         pixels, depths = self.camera.project(centre[None])
-        if np.isfinite(pixels).all():
+        if finite_rows(pixels).all():
             radius = goal_radius * self.camera.scale(float(depths[0]))
-            paint_target(self._canvas, pixels[0], radius)
+            paint_target(self._canvas, pixels[0], radius, self._theme)
 
     def _paint_shadows(self, x: np.ndarray) -> None:
-        patches, height = shadow_patches(self._model, x, _LIGHT)
-        pixels, _ = self.camera.project(patches.reshape(-1, 3))
-        corners = pixels.reshape(-1, 4, 2)
-        seen = np.isfinite(corners).all(axis=(1, 2))
-        darkness = _DARKEST / (1.0 + height[seen] / (0.5 * self._extent))
-        self._canvas.shadow(corners[seen], darkness, palette.SHADOW)
+        corners, height = shadow_patches(self._model, x, _LIGHT)
+        pixels, _ = self.camera.project(corners.reshape(-1, 3))
+        quads = pixels.reshape(-1, 4, 2)
+        seen = np.isfinite(quads).all(axis=(1, 2))
+        darkness = self._theme.shade / (1.0 + height[seen] / (0.5 * self._extent))
+        self._canvas.shadow(quads[seen], darkness, self._theme.shadow)
 
-    def _paint_background(
-        self, view: tuple[np.ndarray, np.ndarray], rails: tuple[Segment, ...]
-    ) -> None:
-        canvas, model = self._canvas, self._model
-        tile = round_length(self._extent / 6.0)
-        room = (model.room.lower, model.room.upper)
-        canvas.paste(floor_pixels(self.camera, canvas.size, view, room, tile))
-        for rail in rails:
-            ends, _ = self.camera.project(np.array(rail, dtype=np.float64))
-            canvas.stroke(ends, 4.0 * canvas.unit, palette.LIGHT_STEEL)
-        if np.isfinite(model.room.lower[2]):
-            place = (48.0 * canvas.unit, canvas.size[1] - 16.0 * canvas.unit)
-            canvas.text(f"tile {tile:g} m", place, 19.0 * canvas.unit, palette.INK)
-        canvas.keep_as_background()
+
+def _facets(corners: np.ndarray) -> np.ndarray:
+    """Return the normals (Q, 3) of patches (Q, 4, 3)."""
+    return np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])

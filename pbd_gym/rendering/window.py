@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pbd_gym.rendering.palette import PAPER
-from pbd_gym.rendering.renderer import check_size
+from pbd_gym.rendering.look import check_size
+from pbd_gym.rendering.palette import LIGHT, Colour
 from pbd_gym.rendering.video import check_frame
 
 if TYPE_CHECKING:
@@ -24,18 +24,27 @@ class Window:
         size: Width and height of the window when it opens [pixels], as for a `Renderer`.
         fps: Frames per second; 0 for as fast as they come.
         title: In the bar of the window.
+        background: Colour beside a picture of other proportions.
 
     Attributes:
         closed: Whether the window has been closed, by the user or by `close`.
     """
 
-    def __init__(self, size: tuple[int, int], fps: float, *, title: str = "pbd_gym") -> None:
+    def __init__(
+        self,
+        size: tuple[int, int],
+        fps: float,
+        *,
+        title: str = "pbd_gym",
+        background: Colour = LIGHT.paper,
+    ) -> None:
         if not (np.isfinite(fps) and fps >= 0.0):
             raise ValueError(f"fps is {fps!r}; it must be finite and at least 0")
         self.closed = False
         self._size = check_size(size)
         self._fps = fps
         self._title = title
+        self._background = background
         self._clock: pygame.time.Clock | None = None
 
     def __enter__(self) -> Window:
@@ -72,7 +81,7 @@ class Window:
         if share != 1.0:
             fitted = (max(round(width * share), 1), max(round(height * share), 1))
             picture = pygame.transform.smoothscale(picture, fitted)
-        screen.fill(PAPER)
+        screen.fill(self._background)
         screen.blit(picture, picture.get_rect(center=screen.get_rect().center))
         pygame.display.flip()
         clock.tick(self._fps)
