@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry, kernel
 
 
-@kernel
+@entry
 def bounds(points: Any) -> tuple[float, float, float, float]:
     """Return least x and y and greatest x and y of the finite of points (M, 2)."""
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
@@ -22,7 +22,7 @@ def bounds(points: Any) -> tuple[float, float, float, float]:
     return left, top, right, bottom
 
 
-@kernel
+@entry
 def cover_lines(starts: Any, ends: Any, radii: Any, coverage: Any, nearest: Any) -> None:
     """Cover lines with round ends; where some overlap, the one that covers most counts.
 
@@ -54,7 +54,7 @@ def cover_lines(starts: Any, ends: Any, radii: Any, coverage: Any, nearest: Any)
                     nearest[row, column] = k
 
 
-@kernel
+@entry
 def cover_polygon(points: Any, coverage: Any) -> None:
     """Cover the inside of a polygon by the exact area of each pixel.
 
@@ -114,7 +114,7 @@ def _ramp(x: float, length: float) -> float:
     return 0.5 * inside * inside / length + max(x - length, 0.0)
 
 
-@kernel
+@entry
 def blend(picture: Any, coverage: Any, nearest: Any, colours: Any, opacity: float) -> None:
     """Lay colours over a picture where they cover it, and empty the coverage.
 
@@ -138,7 +138,7 @@ def blend(picture: Any, coverage: Any, nearest: Any, colours: Any, opacity: floa
                     )
 
 
-@kernel
+@entry
 def draw_discs(picture: Any, centres: Any, radii: Any, colours: Any) -> None:
     """Draw discs one after the other.
 

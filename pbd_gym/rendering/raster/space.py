@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pbd_gym.physics.compiling import kernel
+from pbd_gym.physics.compiling import entry, kernel
 
 
-@kernel
+@entry
 def draw_triangles(corners: Any, nearness: Any, colours: Any, image: Any, nearest: Any) -> None:
     """Draw triangles whose colours blend from corner to corner.
 
@@ -71,7 +71,7 @@ def _within(at_zero: float, slope: float, left: float, right: float) -> tuple[fl
     return (left, right) if at_zero >= 0.0 else (np.inf, -np.inf)
 
 
-@kernel
+@entry
 def draw_capsules(
     ends: Any,
     radii: Any,
@@ -128,7 +128,7 @@ def draw_capsules(
                         image[row, column, channel] = int(tone + (255.0 - tone) * gloss)
 
 
-@kernel
+@entry
 def resolve(image: Any, nearest: Any, times: int, opacity: float, picture: Any) -> None:
     """Average samples over pixels, lay them over a picture and empty them.
 
@@ -160,7 +160,7 @@ def resolve(image: Any, nearest: Any, times: int, opacity: float, picture: Any) 
                 pixel[2] = int(pixel[2] * rest + blue * scale + 0.5)
 
 
-@kernel
+@entry
 def darken(quads: Any, opacity: Any, mask: Any) -> None:
     """Raise a mask to the opacity of each quadrilateral where it covers the middle of a cell.
 
@@ -188,7 +188,7 @@ def darken(quads: Any, opacity: Any, mask: Any) -> None:
                     mask[row, column] = opacity[k]
 
 
-@kernel
+@entry
 def tint(mask: Any, cell: int, colour: Any, picture: Any) -> None:
     """Lay a colour over a picture as opaque as a coarse mask says, blended between its cells.
 
