@@ -48,7 +48,7 @@ def weave(
     normal = np.cross(np.gradient(surface, axis=1), np.gradient(surface, axis=0))
     patches = quads(surface)
     tone = _pattern(surface.shape[0] - 1, surface.shape[1] - 1, pieces)
-    seen = np.isfinite(patches).all(axis=(1, 2))
+    seen = np.asarray(np.isfinite(patches).all(axis=(1, 2)))
     for row, column in holes:
         seen[row * (surface.shape[1] - 1) + column] = False
     paints = []
