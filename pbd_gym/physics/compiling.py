@@ -35,14 +35,16 @@ _KERNELS = Path(__file__).parent / "kernels"
 _loading = threading.Lock()
 
 
-def kernel(function: Callable[..., Any]) -> Any:
+def kernel(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a function that other kernels call, to IEEE arithmetic.
 
     No fastmath: the bits must not depend on the processor. error_model="numpy", as the branch that
     raises ZeroDivisionError would stop the vectoriser. What would unpack the arguments from Python
     objects is left out: for a model's tables it took as long to compile as the function itself.
     """
-    dispatcher = _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    dispatcher = _compiled(
+        function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
+    )
     if not _SETTINGS.DISABLE_JIT:
         dispatcher.__class__ = _Inner
     return dispatcher
@@ -75,6 +77,13 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         return numba.njit(cache=True, **options)(function)
     finally:
         _SETTINGS.CACHE_DIR = before
+
+
+# For what stands in a lane loop: numba optimises a function before its callees are linked in, and
+# LLVM then takes the first lane out of a loop with calls, which leaves 31 lanes to vectorise.
+inlined = functools.partial(kernel, inline="always")
+# For what is handed a whole model: in a call its tables would be copied, some hundred words.
+in_place = functools.partial(kernel, forceinline=True)
 
 
 @functools.cache

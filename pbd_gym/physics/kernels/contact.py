@@ -43,12 +43,14 @@ def read_velocities(work, masses, room, h, rest_speed, forces):
                     lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
                     _bounce(at, mass, axis, lower, upper, restitution, rest_speed, h, force, normal)
                 else:
-                    _read_off(at, mass, axis, h)
+                    _read_off(at, mass, axis, h, np.int64(LANES))
 
 
 @kernel
-def _read_off(at, mass, axis, h):
-    for lane in range(LANES):
+def _read_off(at, mass, axis, h, lanes):
+    # lanes is LANES in a variable: LLVM unrolls so short a loop of known length, lane after lane,
+    # before it comes to vectorise
+    for lane in range(lanes):
         if not is_grabbed(mass, at, lane):
             k = axis * LANES + lane
             at[VELOCITY + k] = (at[POSITION + k] - at[START + k]) / h

@@ -106,13 +106,19 @@ def is_too_fast(work, masses, limit):
     for particle in range(masses.inverse_mass.shape[0]):
         at = row(work, particle)
         for k in range(DIM):
-            for lane in range(LANES):
-                speed = at[VELOCITY + k * LANES + lane]
-                marks[TOO_FAST + lane] += speed * speed
+            _add_squares(marks, at, VELOCITY + k * LANES, np.int64(LANES))
     for lane in range(LANES):
         # what is no number is too fast too
         marks[TOO_FAST + lane] = 0 if marks[TOO_FAST + lane] <= limit * limit else 1
     return _is_marked(marks, TOO_FAST)
+
+
+@kernel
+def _add_squares(marks, at, quantity, lanes):
+    # lanes: see `_read_off` in contact.py
+    for lane in range(lanes):
+        speed = at[quantity + lane]
+        marks[TOO_FAST + lane] += speed * speed
 
 
 @kernel

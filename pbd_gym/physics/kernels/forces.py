@@ -13,6 +13,8 @@ A constraint with a vector has DIM rows, so that a pointer to the first serves k
 """
 
 import numpy as np
+from numba.core import types
+from numba.extending import overload
 
 from ..compiling import kernel, row
 from ..parameters import Forces
@@ -47,11 +49,21 @@ def force_row(forces, kind, index):
     return row(forces[0], forces[3][kind] + index)
 
 
-@kernel
 def note(force, at, multiplier):
     """Add to what is collected in a row of `force_row`."""
     if force is not None:
         force[at] += multiplier
+
+
+# As in masses.py: a call in a lane loop would cost its vectors.
+@overload(note, inline="always")
+def _note(force, at, multiplier):
+    def add(force, at, multiplier):
+        force[at] += multiplier
+
+    if isinstance(force, types.NoneType):
+        return lambda force, at, multiplier: None
+    return add
 
 
 @kernel

@@ -5,7 +5,10 @@ their inverse masses stand in the scratch rows. Which of the two holds is known 
 compiled: without grabs nothing is loaded per lane.
 """
 
-from ..compiling import kernel
+from numba.core import types
+from numba.extending import overload
+
+from ..compiling import inlined, kernel
 from .layout import MASS
 
 
@@ -22,15 +25,20 @@ def _inverse_mass_of(inverse_mass, grabbable, particle):
     return None
 
 
-@kernel
 def in_lane(inverse_mass, at, lane):
     """Return an inverse mass of `inverse_mass_of` in a lane, `at` being the particle's row."""
-    if inverse_mass is None:
-        return at[MASS + lane]
-    return inverse_mass
+    return at[MASS + lane] if inverse_mass is None else inverse_mass
 
 
-@kernel
+# Written into its callers by type: a call in a lane loop costs its vectors (see `inlined`).
+@overload(in_lane, inline="always")
+def _in_lane(inverse_mass, at, lane):
+    if isinstance(inverse_mass, types.NoneType):
+        return lambda inverse_mass, at, lane: at[MASS + lane]
+    return lambda inverse_mass, at, lane: inverse_mass
+
+
+@inlined
 def is_grabbed(inverse_mass, at, lane):
     """Tell whether a particle that is free as built is a pin in a lane."""
     if inverse_mass is None:

@@ -1,6 +1,6 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
-from ..compiling import borrowed, entry, kernel, row
+from ..compiling import borrowed, entry, in_place, kernel, row
 from .attachment import project_attachments
 from .chain import project_chain_velocities, project_chains, project_chains_from_start
 from .collider import collide_with_shapes
@@ -128,7 +128,7 @@ def _predict(work, masses, timing, second_order):
                     at[POSITION + at_k] += at[VELOCITY + at_k] * h
 
 
-@kernel
+@in_place
 def _project(work, model, found, timing, iterations, second_order, forces):
     """Step 4: satisfy the constraints. Soft ones first, chains after them, contacts last."""
     masses, inverse_h2 = model.particles, timing.inverse_h2
@@ -157,7 +157,7 @@ def _project(work, model, found, timing, iterations, second_order, forces):
     finish_ropes(work, masses, model.ropes, inverse_h2, forces)
 
 
-@kernel
+@in_place
 def _project_again(work, model, found, timing, second_order, forces):
     """Solve the substep in first order where the second-order solve has failed."""
     if second_order is None:
@@ -170,7 +170,7 @@ def _project_again(work, model, found, timing, second_order, forces):
         take_up_kept_forces(forces, work)
 
 
-@kernel
+@in_place
 def _collide_with_others(work, model, encounters, listed, timing, forces):
     """Part what collides, what stands on the ground before what stands on that."""
     if encounters is None:
@@ -183,7 +183,7 @@ def _collide_with_others(work, model, encounters, listed, timing, forces):
         collide_with_others(work, masses, encounters, listed, timing, sweep, forces)
 
 
-@kernel
+@in_place
 def _finish(work, model, timing, second_order, forces):
     """Second order: the other half kick, and no velocity along what is rigid."""
     if second_order is None:

@@ -197,7 +197,9 @@ def _bend_with_friction(a, b, c, mass_a, mass_b, mass_c, alpha, held, force):
             change = a[at] - a[start] - two * (b[at] - b[start]) + c[at] - c[start]
             square += change * change
         size = np.sqrt(square)
-        rub = min(held / size, static) if size > zero else zero
+        most = held / size
+        # no call of min: see `inlined` in compiling.py
+        rub = (static if static < most else most) if size > zero else zero
         for k in range(DIM):
             at, start = POSITION + k * LANES + lane, START + k * LANES + lane
             change = a[at] - a[start] - two * (b[at] - b[start]) + c[at] - c[start]
