@@ -8,7 +8,7 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench accuracy clean
+.PHONY: help train test lint bench accuracy roofline clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -34,6 +34,9 @@ bench: .venv/.installed-core ## measure control steps per second
 
 accuracy: .venv/.installed-peers ## compare error and cost with other engines
 	$(BIN)/python benchmarks/accuracy.py $(ARGS)
+
+roofline: .venv/.installed-peers ## compare the kernels' speed with C
+	$(BIN)/python benchmarks/roofline.py $(ARGS)
 
 clean: ## remove .venv, caches and build files; results of training stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache

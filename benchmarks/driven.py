@@ -71,9 +71,7 @@ def driven_cloth(size: int = 16, *, substeps: int = 20) -> Driven:
     def targets(at: float) -> np.ndarray:
         reach = 1.0 - (1.0 - 1.0 / 1.1) * ramp(0.5 * at)[0]
         angle = 0.25 * ramp(max(at - 1.0, 0.0))[0] * np.sin(2.0 * np.pi * at)
-        return np.array(
-            [[0.0, 0.0, 0.0], [reach * np.cos(angle), reach * np.sin(angle), 0.0]]
-        )
+        return np.array([[0.0, 0.0, 0.0], [reach * np.cos(angle), reach * np.sin(angle), 0.0]])
 
     model = builder.build(gravity=(0.0, 0.0, -GRAVITY))
     return Driven(f"cloth {size}x{size}", model, substeps, targets)

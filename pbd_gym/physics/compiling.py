@@ -42,9 +42,7 @@ def kernel(function: Callable[..., Any], **options: Any) -> Any:
     raises ZeroDivisionError would stop the vectoriser. What would unpack the arguments from Python
     objects is left out: for a model's tables it took as long to compile as the function itself.
     """
-    dispatcher = _compiled(
-        function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
-    )
+    dispatcher = _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
     if not _SETTINGS.DISABLE_JIT:
         dispatcher.__class__ = _Inner
     return dispatcher
