@@ -96,7 +96,11 @@ def test_the_table_of_environments_is_of_today(id):
 
 @pytest.mark.parametrize(
     ("page", "mark", "results"),
-    [("README.md", "speed", "throughput.md"), ("docs/physics.md", "accuracy", "accuracy.md")],
+    [
+        ("README.md", "speed", "throughput.md"),
+        ("docs/physics.md", "accuracy", "accuracy.md"),
+        ("docs/performance.md", "roofline", "roofline.md"),
+    ],
 )
 def test_tables_are_those_of_the_committed_results(page, mark, results):
     text = (ROOT / page).read_text(encoding="utf-8")

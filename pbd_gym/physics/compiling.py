@@ -77,9 +77,6 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         _SETTINGS.CACHE_DIR = before
 
 
-# For what stands in a lane loop: numba optimises a function before its callees are linked in, and
-# LLVM then takes the first lane out of a loop with calls, which leaves 31 lanes to vectorise.
-inlined = functools.partial(kernel, inline="always")
 # For what is handed a whole model: in a call its tables would be copied, some hundred words.
 in_place = functools.partial(kernel, forceinline=True)
 

@@ -8,7 +8,7 @@ compiled: without grabs nothing is loaded per lane.
 from numba.core import types
 from numba.extending import overload
 
-from ..compiling import inlined, kernel
+from ..compiling import kernel
 from .layout import MASS
 
 
@@ -30,7 +30,8 @@ def in_lane(inverse_mass, at, lane):
     return at[MASS + lane] if inverse_mass is None else inverse_mass
 
 
-# Written into its callers by type: a call in a lane loop costs its vectors (see `inlined`).
+# Written into its callers. numba optimises a function before its callees are linked in, and of a loop
+# with calls LLVM then peels the first lane off, which leaves 31 lanes to vectorise.
 @overload(in_lane, inline="always")
 def _in_lane(inverse_mass, at, lane):
     if isinstance(inverse_mass, types.NoneType):
@@ -38,7 +39,7 @@ def _in_lane(inverse_mass, at, lane):
     return lambda inverse_mass, at, lane: inverse_mass
 
 
-@inlined
+@kernel
 def is_grabbed(inverse_mass, at, lane):
     """Tell whether a particle that is free as built is a pin in a lane."""
     if inverse_mass is None:
