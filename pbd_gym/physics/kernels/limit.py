@@ -48,7 +48,7 @@ def _limit(a, b, mass_a, mass_b, least, greatest, alpha, force):
             delta = a[POSITION + k * LANES + lane] - b[POSITION + k * LANES + lane]
             square += delta * delta
         length = np.sqrt(square)
-        # no calls of max and min: see `in_lane` in masses.py
+        # no calls of max and min: see `_note` in forces.py
         over, under = length - greatest, length - least
         error = (over if over > zero else zero) + (under if under < zero else zero)
         scale = share * error / length if length > zero else zero

@@ -5,9 +5,6 @@ their inverse masses stand in the scratch rows. Which of the two holds is known 
 compiled: without grabs nothing is loaded per lane.
 """
 
-from numba.core import types
-from numba.extending import overload
-
 from ..compiling import kernel
 from .layout import MASS
 
@@ -25,18 +22,12 @@ def _inverse_mass_of(inverse_mass, grabbable, particle):
     return None
 
 
+@kernel
 def in_lane(inverse_mass, at, lane):
     """Return an inverse mass of `inverse_mass_of` in a lane, `at` being the particle's row."""
-    return at[MASS + lane] if inverse_mass is None else inverse_mass
-
-
-# Written into its callers. numba optimises a function before its callees are linked in, and of a loop
-# with calls LLVM then peels the first lane off, which leaves 31 lanes to vectorise.
-@overload(in_lane, inline="always")
-def _in_lane(inverse_mass, at, lane):
-    if isinstance(inverse_mass, types.NoneType):
-        return lambda inverse_mass, at, lane: at[MASS + lane]
-    return lambda inverse_mass, at, lane: inverse_mass
+    if inverse_mass is None:
+        return at[MASS + lane]
+    return inverse_mass
 
 
 @kernel

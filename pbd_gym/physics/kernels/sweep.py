@@ -198,7 +198,7 @@ def _bend_with_friction(a, b, c, mass_a, mass_b, mass_c, alpha, held, force):
             square += change * change
         size = np.sqrt(square)
         most = held / size
-        # no call of min: see `in_lane` in masses.py
+        # no call of min: see `_note` in forces.py
         rub = (static if static < most else most) if size > zero else zero
         for k in range(DIM):
             at, start = POSITION + k * LANES + lane, START + k * LANES + lane
