@@ -55,7 +55,7 @@ def note(force, at, multiplier):
         force[at] += multiplier
 
 
-# Written into its callers. numba optimises a function before its callees are linked in, and of a loop
+# Written into its callers. numba optimises a function before its callees are linked in; of a loop
 # with calls LLVM then peels the first lane off, which leaves 31 lanes to vectorise.
 @overload(note, inline="always")
 def _note(force, at, multiplier):
