@@ -60,11 +60,20 @@ for _ in range(125):
     )
 
 
-@pytest.mark.parametrize("name", ["custom_task.py", "pixels.py", "record_video.py"])
+def test_an_episode_is_planned(tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    small = "--candidates 32 --horizon 10 --iterations 1 --steps 12 --video plan.mp4"
+    printed = run("plan.py", *small.split(), folder=tmp_path)
+    assert re.search(r"return \d+\.\d in 12 steps", printed)
+    assert re.search(r"real-time factor of planning: \d+\.\d\d", printed)
+    assert (tmp_path / "plan.mp4").stat().st_size > 0
+
+
+@pytest.mark.parametrize("name", ["custom_task.py", "pixels.py", "plan.py", "record_video.py"])
 def test_examples_with_options_explain_them(name, tmp_path):
     assert "--help" in run(name, "--help", folder=tmp_path)
 
 
 def test_no_example_is_forgotten():
-    tested = {"custom_task.py", "pixels.py", "quickstart.py", "record_video.py"}
+    tested = {"custom_task.py", "pixels.py", "plan.py", "quickstart.py", "record_video.py"}
     assert {path.name for path in EXAMPLES.glob("*.py")} == tested

@@ -25,6 +25,7 @@ from stable_baselines3 import PPO, SAC
 import pbd_gym
 import train
 from pbd_gym.hyperparams import ALGORITHMS, algorithm_arguments, load_hyperparameters
+from pbd_gym.planning import SETTINGS
 
 ROPE = "pbd_gym:PBDRope-v0"
 SMALL = {
@@ -223,10 +224,20 @@ def test_the_scripted_policy_is_measured_above_noop_and_random(tmp_path):
     assert means["scripted"] > max(means["noop"], means["random"])
 
 
+def test_the_planner_is_measured_like_any_policy(tmp_path, monkeypatch):
+    small = {"horizon": 4, "knots": 2, "candidates": 8, "iterations": 1, "replan": 4}
+    monkeypatch.setitem(SETTINGS, "PBDRope-v0", small)
+    file = tmp_path / "planner.json"
+    assert evaluate.main(["planner", "--episodes", "2", "--json", str(file)]) == 0
+    first = json.loads(file.read_text())["return"]
+    assert evaluate.main(["planner", "--episodes", "2", "--json", str(file)]) == 0
+    assert json.loads(file.read_text())["return"] == first
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["trained.zip"], "policy must be noop, random, scripted or a file"),
+        (["trained.zip"], "policy must be noop, random, scripted, planner or a file"),
         (["noop", "--episodes", "0"], "--episodes must be at least 1"),
         (["noop", "--json", "no_such_folder/out.json"], "no folder no_such_folder"),
         (["noop", "--env", "pbd_gym:PBDRobe-v0"], "PBDRobe"),

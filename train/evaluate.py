@@ -23,6 +23,7 @@ EXAMPLES = """\
 examples:
   python train/evaluate.py scripted
   python train/evaluate.py random --env pbd_gym:PBDCloth-v0 --episodes 1000
+  python train/evaluate.py planner --env pbd_gym:PBDTriplePendulum-v0 --episodes 5
   python train/evaluate.py runs/PBDRope-v0-ppo-0 --video rope.mp4 --json rope.json
       the best model of a run, in the environment it was trained in
 
@@ -36,7 +37,8 @@ def build_parser() -> argparse.ArgumentParser:
         description=__doc__, epilog=EXAMPLES, formatter_class=HelpFormatter
     )
     parser.add_argument(
-        "policy", help="noop, random, scripted, a saved model (.zip), or the folder of a run"
+        "policy",
+        help="noop, random, scripted, planner, a saved model (.zip), or the folder of a run",
     )
     parser.add_argument(
         "--env", metavar="ID", help=f"environment (default: the run's, or else {DEFAULT_ENV})"

@@ -13,13 +13,14 @@ from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
 from pbd_gym.hyperparams import algorithm_class
+from pbd_gym.planning import Planner, planner_settings
 
 Policy = Callable[[Any], np.ndarray]
 
 # A HerReplayBuffer could not be made without worlds, and a model that only acts needs none.
 NO_HINDSIGHT = {"replay_buffer_class": None, "replay_buffer_kwargs": {}}
 
-BASELINES = ("noop", "random", "scripted")
+BASELINES = ("noop", "random", "scripted", "planner")
 
 
 def make_policy(name: str, env: VectorEnv, *, seed: int = 0) -> Policy:
@@ -27,10 +28,10 @@ def make_policy(name: str, env: VectorEnv, *, seed: int = 0) -> Policy:
 
     Args:
         name: "noop" (no motion), "random" (uniform actions), "scripted" (the task's own
-            baseline), or the path of a model that stable-baselines3 has saved. Loading a model
-            unpickles, so load only your own.
+            baseline), "planner" (search on snapshots of the worlds), or the path of a model that
+            stable-baselines3 has saved. Loading a model unpickles, so load only your own.
         env: The native batch to act in.
-        seed: Of the random policy.
+        seed: Of the random policy and of the planner.
     """
     if name == "noop":
         actions = np.zeros(env.action_space.shape or (), dtype=np.float32)
@@ -40,7 +41,37 @@ def make_policy(name: str, env: VectorEnv, *, seed: int = 0) -> Policy:
         return lambda observation: env.action_space.sample()
     if name == "scripted":
         return env.unwrapped.task.scripted  # type: ignore[attr-defined]
+    if name == "planner":
+        return PlannedPolicy(env, seed)
     return _load_model(Path(name), env)
+
+
+class PlannedPolicy:
+    """Plans from the true state of the worlds, whatever is observed, and plays some of each plan.
+
+    Args:
+        env: The native batch with autoreset in the same step.
+        seed: Of the planner, anew whenever all episodes begin.
+    """
+
+    def __init__(self, env: VectorEnv, seed: int) -> None:
+        self._env: Any = env.unwrapped
+        self._seed = seed
+        settings = planner_settings(env.spec.id if env.spec else "")
+        self._planner = Planner(self._env.task, settings, num_worlds=env.num_envs, seed=seed)
+        self._queue: list[np.ndarray] = []
+
+    def __call__(self, observation: Any) -> np.ndarray:
+        """Return the next actions (W, action) of the plan."""
+        state = self._env.get_state()
+        begun = state.elapsed == 0
+        if begun.any():
+            self._planner.reset(self._seed) if begun.all() else self._planner.forget(begun)
+            self._queue = []
+        if not self._queue:
+            actions = self._planner.plan(state).actions[:, : self._planner.settings.replan]
+            self._queue = list(actions.transpose(1, 0, 2))
+        return self._queue.pop(0)
 
 
 def _load_model(path: Path, env: VectorEnv) -> Policy:
