@@ -4,7 +4,9 @@ On SDL's dummy display the buttons and keys are events that are posted. Under Xv
 installed, they are pressed on the X server itself, as by a user.
 """
 
+import atexit
 import ctypes
+import functools
 import os
 import shutil
 import subprocess
@@ -80,11 +82,26 @@ class XHand(Hand):
         super()._settle()
 
 
-def start_xvfb():
-    """Start a server and return its process and the name of its display."""
+def choose_display(driver, monkeypatch):
+    """Let the next window open on a display of DRIVERS."""
+    monkeypatch.setenv("SDL_VIDEODRIVER", driver)
+    monkeypatch.setenv("SDL_VIDEO_WINDOW_POS", "0,0")
+    if driver == "x11":
+        monkeypatch.setenv("DISPLAY", _xvfb())
+
+
+def hand_on(driver, pygame, frame):
+    """Return a mouse and keyboard for a window whose pictures `frame` draws."""
+    return (XHand if driver == "x11" else Hand)(pygame, frame)
+
+
+@functools.cache
+def _xvfb():
+    """Start a server that ends with the tests; return the name of its display."""
     read, write = os.pipe()
     command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1400x1000x24", "-nolisten", "tcp"]
     server = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
+    atexit.register(server.terminate)
     with os.fdopen(read) as pipe:
-        return server, f":{pipe.readline().strip()}"
+        return f":{pipe.readline().strip()}"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from display import DRIVERS, Hand, XHand, start_xvfb
+from display import DRIVERS, choose_display, hand_on
 
 from pbd_gym.playground.drawing import Drawing, Particle, Settings, Thread
 from pbd_gym.playground.files import at_rest, load_scene, save_scene
@@ -14,14 +14,6 @@ from pbd_gym.playground.simulation import begin
 pytest.importorskip("pygame_gui")
 
 
-@pytest.fixture(scope="module")
-def x_display():
-    server, name = start_xvfb()
-    yield name
-    server.terminate()
-    server.wait()
-
-
 @pytest.fixture(params=DRIVERS)
 def play(request, monkeypatch, tmp_path):
     """A function that opens the program on a scene and returns it with a mouse."""
@@ -29,10 +21,7 @@ def play(request, monkeypatch, tmp_path):
 
     from pbd_gym.playground.app import App
 
-    monkeypatch.setenv("SDL_VIDEODRIVER", request.param)
-    monkeypatch.setenv("SDL_VIDEO_WINDOW_POS", "0,0")
-    if request.param == "x11":
-        monkeypatch.setenv("DISPLAY", request.getfixturevalue("x_display"))
+    choose_display(request.param, monkeypatch)
     opened = []
 
     def open_app(scene):
@@ -47,8 +36,7 @@ def play(request, monkeypatch, tmp_path):
             time.sleep(0.01)
         for _ in range(5):
             app.frame()
-        hand = XHand if request.param == "x11" else Hand
-        return app, hand(pygame, app.frame)
+        return app, hand_on(request.param, pygame, app.frame)
 
     yield open_app
     for app in opened:
@@ -243,6 +231,28 @@ def test_closing_the_window_ends_the_program(play):
     app.run()
     assert not app.running
     assert not pygame.display.get_init()
+
+
+def test_a_cloth_in_space_is_dragged_and_cut_and_not_drawn_upon(play):
+    app, hand = play(at_rest(SCENES["Cloth in space"]()))
+    last = len(app.stage.drawing.particles) - 1
+    start = seen(app, last)
+    hand.press(start)
+    before = position(app, last)
+    hand.move((start[0] + 80, start[1] - 80))
+    for _ in range(20):
+        app.frame()
+    assert np.linalg.norm(position(app, last) - before) > 0.05
+    hand.release((start[0] + 80, start[1] - 80))
+    threads = len(app.stage.drawing.threads)
+    hand.key("3")
+    middle = seen(app, last // 2)
+    hand.drag((middle[0] - 40, middle[1]), (middle[0] + 41, middle[1] + 3))
+    assert len(app.stage.drawing.threads) > threads
+    assert app.stage.simulation.worlds["pbd"].model.bodies[0].holes
+    hand.key("4")
+    hand.click((200, 200))
+    assert "flat scene" in app.stage.message
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if SCENES[name]().dim == 2])

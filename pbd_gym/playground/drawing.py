@@ -138,7 +138,7 @@ class Skin:
     """
 
     triangles: tuple[tuple[int, int, int], ...]
-    shape_stiffness: float = 100.0
+    shape_stiffness: float = 20.0
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from pbd_gym.playground.drawing import (
 
 _PLANE = ((-1.6, -1.1), (1.6, 0.8))
 _SPACE = ((-0.7, -0.7, 0.0), (0.7, 0.7, 1.1))
-_SHEAR = 1e-2  # compliance of a cloth's diagonals [m/N]
+_SHEAR = 0.1  # compliance of a cloth's diagonals [m/N]
 
 
 def pendulum(links: int) -> Drawing:
