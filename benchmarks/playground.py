@@ -1,4 +1,6 @@
-"""How many particles the playground simulates and draws, in pictures per second on one core.
+"""How many particles the playground simulates and draws, in pictures per second of one core.
+
+What counts is the core's own time, so that a busy machine does not disturb the measurement.
 
 python benchmarks/playground.py
 """
@@ -32,17 +34,17 @@ def open_scene(drawing: Drawing):
 
 
 def measure(drawing: Drawing, pictures: int) -> tuple[float, float]:
-    """Return the median times of a picture and of the physics within it [s]."""
+    """Return the median core times of a picture and of the physics within it [s]."""
     app = open_scene(drawing)
     assert app.stage is not None
     simulation = app.stage.simulation
     frames, steps = [], []
     for index in range(pictures + 5):
-        start = time.perf_counter()
+        start = time.process_time()
         app.frame()
-        middle = time.perf_counter()
+        middle = time.process_time()
         simulation.step()
-        end = time.perf_counter()
+        end = time.process_time()
         if index >= 5:  # the first ones load what is used for the first time
             frames.append(middle - start)
             steps.append(end - middle)
@@ -64,7 +66,7 @@ def main() -> None:
         "cloth 100 x 100": net(100),
         "cloth 100 x 100, 4 substeps": replace(net(100), settings=coarse),
     }
-    print(f"window {SIZE[0]} x {SIZE[1]}, one core, load {os.getloadavg()[0]:.1f}")
+    print(f"window {SIZE[0]} x {SIZE[1]}, one core")
     print("| scene | particles | pictures per second | picture [ms] | physics in it [ms] |")
     print("| --- | ---: | ---: | ---: | ---: |")
     for name, drawing in scenes.items():

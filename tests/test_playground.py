@@ -224,6 +224,35 @@ def test_h_opens_and_closes_the_help(play):
     assert (plain != closed).any(axis=2).mean() < 0.1
 
 
+def test_strain_is_shown_in_colours(play):
+    app, hand = play(hanging_rope())
+    pygame = pytest.importorskip("pygame")
+    hand.key("space")
+    plain = pygame.surfarray.array3d(pygame.display.get_surface())
+    press_button(app, hand, "Strain")
+    coloured = pygame.surfarray.array3d(pygame.display.get_surface())
+    place = app.stage.view.place
+    differ = (plain != coloured).any(axis=2)[: place.right, place.top : place.bottom]
+    assert differ.sum() > 500  # the rope and the legend
+
+
+def test_a_window_of_any_size_has_room_for_all_controls(play):
+    pygame = pytest.importorskip("pygame")
+    app, _ = play(hanging_rope())
+    for size in ((1400, 900), (901, 641), (300, 200)):
+        pygame.display.set_mode(size, pygame.RESIZABLE)
+        pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
+        for _ in range(3):
+            app.frame()
+        window = pygame.display.get_surface().get_rect()
+        controls = [*app.panel.buttons.values(), app.panel.scene, app.panel.status]
+        controls += [slider.control for slider in app.panel.sliders.values()]
+        places = [control.get_abs_rect() for control in controls]
+        assert all(window.contains(place) for place in places)
+        for index, place in enumerate(places):
+            assert place.collidelist(places[:index]) == -1
+
+
 def test_closing_the_window_ends_the_program(play):
     pygame = pytest.importorskip("pygame")
     app, _ = play(hanging_rope())

@@ -12,10 +12,10 @@ from pygame_gui.elements import UIWindow
 from pbd_gym.playground import theme
 from pbd_gym.playground.capture import Recorder
 from pbd_gym.playground.dialogs import KEYS, open_file_dialog, open_help
-from pbd_gym.playground.display import draw_stage, draw_waiting
+from pbd_gym.playground.display import count_up, draw_stage, draw_waiting
 from pbd_gym.playground.files import Scene, at_rest, load_scene
-from pbd_gym.playground.layout import SIZE, lay_out
-from pbd_gym.playground.panel import INTEGRATORS, Panel
+from pbd_gym.playground.layout import LEAST, SIZE, lay_out
+from pbd_gym.playground.panel import Panel
 from pbd_gym.playground.preparing import Preparation
 from pbd_gym.playground.scenes import SCENES
 from pbd_gym.playground.simulation import Simulation
@@ -128,20 +128,22 @@ class App:
             stage.message = "As it was loaded."
         elif name == "Spring":
             stage.springs = not stage.springs
-        elif name == "Save":
-            stage.message = self._recorder.save(stage.simulation.scene())
-        elif name == "Picture":
-            stage.message = self._recorder.picture(self._screen)
-        elif name == "Film":
-            film, screen = self._recorder, self._screen
-            stage.message = film.finish_film() or film.start_film(screen)
+        elif name == "Strain":
+            stage.view.strains = not stage.view.strains
         elif name == "Integrator":
-            names = list(INTEGRATORS)
-            at = names.index(stage.drawing.settings.integrator)
-            self.panel.choose_integrator(names[(at + 1) % len(names)])
+            self.panel.next_integrator()
             self._has_slid = True
+        else:
+            self._record(stage, name)
 
-    # What is shown.
+    def _record(self, stage: Stage, name: str) -> None:
+        recorder = self._recorder
+        if name == "Save":
+            stage.message = recorder.save(stage.simulation.scene())
+        elif name == "Picture":
+            stage.message = recorder.picture(self._screen)
+        elif name == "Film":
+            stage.message = recorder.finish_film() or recorder.start_film(self._screen)
 
     def _draw(self) -> None:
         self._screen.fill(theme.SIDE)
@@ -161,10 +163,8 @@ class App:
         if self.stage is None:
             return self.message
         if self._pictures % (FPS // 2) == 0:
-            fps = self._clock.get_fps()
-            rate = f"{min(fps / FPS, 1.0) * self.pace:.2g} × real time"
-            count = len(self.stage.drawing.particles)
-            self._numbers = f"{count} particles  ·  {fps:.0f} pictures/s  ·  {rate}  ·  "
+            pace = 0.0 if self.paused else self.pace
+            self._numbers = count_up(self.stage.drawing, self._clock.get_fps(), pace / FPS)
         return self._numbers + (self.stage.message or self.tool.hint)
 
     def _place_controls(self) -> None:
@@ -179,7 +179,7 @@ class App:
             self._manager, self._layout, list(SCENES), drawing.name, drawing.settings
         )
         if self.stage is not None:
-            self.stage.view = View(self._layout.view)
+            self.stage.view = View(self._layout.view, strains=self.stage.view.strains)
         self._has_slid, self._numbers = False, ""
         self._mark_buttons()
 
@@ -190,10 +190,9 @@ class App:
         slow = "Slow" if self.pace == 1.0 else f"1/{1.0 / self.pace:.0f}"
         self.panel.mark("Slow", self.pace != 1.0, slow)
         self.panel.mark("Film", self._recorder.is_filming)
+        self.panel.mark("Strain", self.stage is not None and self.stage.view.strains)
         springs = self.stage is None or self.stage.springs
         self.panel.mark("Spring", springs, "Drag by a spring" if springs else "Drag by hand")
-
-    # What moves.
 
     def _prepare(self) -> None:
         """Begin with the scene that waits, when its physics are there."""
@@ -216,8 +215,6 @@ class App:
             stage.edit(drawing)
         else:
             stage.message = _PREPARING
-
-    # What the user does.
 
     def _take(self, event: pygame.event.Event) -> None:
         if event.type == pygame.QUIT:
@@ -277,6 +274,10 @@ class App:
     def _resize(self) -> None:
         """Fit everything into the window; a film has one size and ends."""
         words = self._recorder.finish_film()
+        width, height = self._screen.get_size()
+        if width < LEAST[0] or height < LEAST[1]:
+            window = (max(width, LEAST[0]), max(height, LEAST[1]))
+            self._screen = pygame.display.set_mode(window, pygame.RESIZABLE)
         self._place_controls()
         if words is not None:
             self.say(words)

@@ -22,6 +22,7 @@ KEYS = {
     pygame.K_r: "Reset",
     pygame.K_i: "Integrator",
     pygame.K_g: "Spring",
+    pygame.K_c: "Strain",
     pygame.K_p: "Picture",
     pygame.K_v: "Film",
     pygame.K_F5: "Save",
@@ -34,7 +35,7 @@ Left button: the tool chosen above. Right button: pin a particle, or free it.
 <b>Keys</b>
 <b>1 2 3 4</b> drag, pin, cut, draw
 <b>space</b> pause, <b>.</b> single step, <b>s</b> slow motion, <b>r</b> reset
-<b>g</b> drag by a spring or by hand, <b>i</b> next integrator
+<b>g</b> drag by a spring or by hand, <b>i</b> next integrator, <b>c</b> colours of strain
 <b>p</b> picture, <b>v</b> film, <b>F5</b> save, <b>F9</b> load
 <b>h</b> this help, <b>Esc</b> leave
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pygame
 
 from pbd_gym.playground import theme
+from pbd_gym.playground.drawing import Drawing
 from pbd_gym.playground.energy import draw_energies
 from pbd_gym.playground.layout import Layout
 from pbd_gym.playground.simulation import REMEMBERED
@@ -22,6 +23,18 @@ def draw_stage(
         tool.draw(screen, stage, pointer)
         screen.set_clip(None)
     draw_energies(screen, layout.curve, stage.simulation.energies, REMEMBERED)
+
+
+def count_up(drawing: Drawing, fps: float, pace: float) -> str:
+    """Return how much there is and how fast it goes.
+
+    Args:
+        drawing: What is shown.
+        fps: Pictures per second.
+        pace: Seconds that pass per picture.
+    """
+    count = len(drawing.particles)
+    return f"{count} particles  ·  {fps:.0f} pictures/s  ·  {fps * pace:.2g} × real time  ·  "
 
 
 def draw_waiting(screen: pygame.Surface, layout: Layout, pictures: int, message: str) -> None:

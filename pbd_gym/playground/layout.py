@@ -11,7 +11,7 @@ COLUMN = 272  # width of the column of controls [pixels]
 STATUS = 30  # height of the line of text at the bottom [pixels]
 MARGIN = 16
 SIZE = (1180, 760)  # of the window when it opens
-LEAST = (940, 680)  # in which the controls have room
+LEAST = (900, 640)  # in which the controls have room
 
 _CURVE = 128  # height of the energy curve [pixels]
 

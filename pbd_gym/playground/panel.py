@@ -13,13 +13,27 @@ from pbd_gym.playground.drawing import RANGES, RIGID, Settings
 from pbd_gym.playground.layout import BAR, MARGIN, Layout
 
 _BUTTON = 32  # height [pixels]
+_GAP, _GROUP_GAP = 5, 14  # between buttons and between groups of them [pixels]
 
 INTEGRATORS = {
     "pbd": "First order (the seed's)",
     "rattle": "Second order (RATTLE)",
     "both": "Both side by side",
 }
-BAR_BUTTONS = ("Drag", "Pin", "Cut", "Draw", "", "Pause", "Step", "Slow", "Reset", "", "Help")
+BAR_BUTTONS = (
+    "Drag",
+    "Pin",
+    "Cut",
+    "Draw",
+    "",
+    "Pause",
+    "Step",
+    "Slow",
+    "Reset",
+    "",
+    "Strain",
+    "Help",
+)
 _COLUMN_BUTTONS = ("Spring", "Save", "Load", "Picture", "Film")
 _NAMES = {
     "gravity": "Gravity",
@@ -66,6 +80,7 @@ class Panel:
         self._manager = manager
         self.settings = settings
         self.buttons: dict[str, UIButton] = {}
+        self._bar_width = layout.view.width
         self._make_bar()
         self._next = layout.column.copy()  # the part of the column that is still free
         self._heading("Scene")
@@ -103,8 +118,10 @@ class Panel:
         elif not on and button.is_selected:
             button.unselect()
 
-    def choose_integrator(self, name: str) -> None:
-        """Show another integrator in the menu."""
+    def next_integrator(self) -> None:
+        """Show the next integrator in the menu, after the last one the first."""
+        names = list(INTEGRATORS)
+        name = names[(names.index(self.read().integrator) + 1) % len(names)]
         place = self.integrator.relative_rect
         self.integrator.kill()
         words = INTEGRATORS[name]
@@ -115,14 +132,17 @@ class Panel:
         return next((name for name, button in self.buttons.items() if button is element), None)
 
     def _make_bar(self) -> None:
-        left, width = MARGIN - 6, 66
+        left, space = MARGIN - 6, self._bar_width - MARGIN
+        named = [name for name in BAR_BUTTONS if name]
+        space -= _GAP * len(named) + _GROUP_GAP * (len(BAR_BUTTONS) - len(named))
+        width = min(space // len(named), 66)
         for name in BAR_BUTTONS:
             if not name:
-                left += 14
+                left += _GROUP_GAP
                 continue
             place = pygame.Rect(left, (BAR - _BUTTON) // 2, width, _BUTTON)
             self.buttons[name] = UIButton(place, name, self._manager)
-            left += width + 5
+            left += width + _GAP
 
     def _make_column_buttons(self) -> None:
         half = (self._next.width - 6) // 2

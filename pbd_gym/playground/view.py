@@ -19,10 +19,15 @@ class View:
 
     Args:
         place: Part of the window.
+
+    Attributes:
+        place: As given.
+        strains: Whether links are coloured by how much they are stretched or pressed.
     """
 
-    def __init__(self, place: pygame.Rect) -> None:
+    def __init__(self, place: pygame.Rect, *, strains: bool = False) -> None:
         self.place = place
+        self.strains = strains
         self._renderers: dict[str, Renderer] = {}
         self._pictures: dict[str, pygame.Rect] = {}
         self._shown: tuple[object, ...] = ()
@@ -77,7 +82,7 @@ class View:
 
     def _fit(self, simulation: Simulation) -> None:
         """Make new renderers where there is something else to draw."""
-        wanted = (simulation, simulation.revision, tuple(simulation.worlds))
+        wanted = (simulation, simulation.revision, tuple(simulation.worlds), self.strains)
         if wanted == self._shown:
             return
         self._shown = wanted
@@ -90,12 +95,13 @@ class View:
             left = self.place.left + column * (width + _GAP)
             self._pictures[name] = pygame.Rect(left, self.place.top, width, height)
             view = _with_ground(simulation.drawing)
-            self._renderers[name] = Renderer(world.model, view, size=(width, height))
+            color = "strain" if self.strains else "material"
+            self._renderers[name] = Renderer(world.model, view, size=(width, height), color=color)
 
 
 def _with_ground(drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
     """Return corners of the view that leave room for the scale below a ground seen edge-on."""
     lower, upper = (np.array(corner, dtype=np.float64) for corner in drawing.view)
     if drawing.dim == 2:
-        lower[1] -= 0.05 * (upper[1] - lower[1])
+        lower[1] -= 0.08 * (upper[1] - lower[1])
     return lower, upper
