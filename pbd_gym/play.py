@@ -11,7 +11,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from pbd_gym.rendering import Renderer, palette
+from pbd_gym.rendering import Renderer
+from pbd_gym.rendering.palette import LIGHT, Colour
 
 Action = Callable[[Any], np.ndarray]
 
@@ -98,7 +99,7 @@ class Play:
             return
         self._ticks += 1
         if not self.is_ready:
-            self._screen.fill(palette.PAPER)
+            self._screen.fill(LIGHT.paper)
             words = "Preparing the physics, once" + "." * (self._ticks // 10 % 4)
             self._write(words, (self._size // 2 - 100, self._size // 2), 26)
         else:
@@ -189,7 +190,7 @@ class Play:
     def _draw(self) -> None:
         frame: Any = self._env.render()
         size = (self._size, self._size)
-        self._screen.fill(palette.PAPER)
+        self._screen.fill(LIGHT.paper)
         self._screen.blit(self._pygame.image.frombuffer(frame.tobytes(), size, "RGB"), (0, 0))
         left, top = self._size + 20, 18
         grippers = ("both grippers", "first gripper", "second gripper")
@@ -206,30 +207,30 @@ class Play:
             top += 34
         if self.ended or self.info.get("is_success"):
             words = self.ended or "Success"
-            colour = palette.BLUE if self.info.get("is_success") else palette.DARK_ORANGE
+            colour = LIGHT.body if self.info.get("is_success") else LIGHT.goal_edge
             self._write(words, (left, top + 8), 34, colour)
         if self._has_help:
             for line, words in enumerate(reversed(KEYS.splitlines())):
-                self._write(words, (left, self._size - 34 - 22 * line), 20, palette.STEEL)
+                self._write(words, (left, self._size - 34 - 22 * line), 20, LIGHT.steel)
 
     def _bar(self, name: str, value: float, place: tuple[int, int]) -> None:
         """Show a quantity as a number and, as far as it lies in [0, 1], as a bar."""
         draw, width = self._pygame.draw, _COLUMN - 40
-        self._write(name, place, 20, palette.STEEL)
+        self._write(name, place, 20, LIGHT.steel)
         number = f"{value:.3f}"
         shift = width - self._font(20).size(number)[0]
         self._write(number, (place[0] + shift, place[1]), 20)
         box = (place[0], place[1] + 18, width, 5)
-        draw.rect(self._screen, palette.GRID, box, border_radius=2)
+        draw.rect(self._screen, LIGHT.grid, box, border_radius=2)
         filled = round(width * min(max(value, 0.0), 1.0))
-        draw.rect(self._screen, palette.BLUE, (*box[:2], filled, 5), border_radius=2)
+        draw.rect(self._screen, LIGHT.body, (*box[:2], filled, 5), border_radius=2)
 
     def _write(
         self,
         words: str,
         place: tuple[int, int],
         size: int,
-        colour: palette.Colour = palette.DARK_STEEL,
+        colour: Colour = LIGHT.dark_steel,
     ) -> None:
         self._screen.blit(self._font(size).render(words, True, colour), place)
 
