@@ -43,7 +43,8 @@ class PlannerSettings:
         iterations: Refinements of the distribution in each plan.
         elites: Share of the candidates that "cem" goes on from: the best ones.
         guided: Share of the candidates that hand over to the task's scripted policy at a drawn
-            step: feedback holds what no open sequence can, such as an inverted pendulum.
+            step, one of them at the first: feedback holds what no open sequence can, such as an
+            inverted pendulum, and no plan promises less than the scripted policy earns.
         temperature: Of the weights of "mppi", in standard deviations of the returns.
         spread: Standard deviation of the noise in each plan's first iteration.
         tail: Control steps for which the last reward is counted once more: what comes beyond the
@@ -90,7 +91,8 @@ class PlannerSettings:
 _PENDULUM = {"horizon": 70, "knots": 14, "candidates": 512, "guided": 0.25}
 _PENDULUM |= {"spread": 0.8, "tail": 20.0, "replan": 10}
 _ROPE = {"knots": 10, "iterations": 4, "guided": 0.125, "spread": 0.4, "replan": 10}
-_CLOTH = {"horizon": 24, "knots": 5, "candidates": 64, "guided": 0.25, "spread": 0.4}
+_CLOTH = {"horizon": 90, "knots": 9, "candidates": 48, "iterations": 2, "guided": 0.5}
+_CLOTH |= {"spread": 0.3, "replan": 15}
 SETTINGS: dict[str, dict[str, Any]] = {
     "PBDPendulum-v0": _PENDULUM,
     "PBDDoublePendulum-v0": _PENDULUM,
@@ -232,6 +234,7 @@ class Planner:
         batch, sequences = self._batch, candidates.reshape(-1, *candidates.shape[2:])
         batch.set_state(start)
         handed = self._random.integers(0, self.settings.horizon, len(self._guided))
+        handed[:: max(len(handed) // self.num_worlds, 1)] = 0  # one in each world from the start
         rewards = np.empty(sequences.shape[:2])
         for step in range(self.settings.horizon):
             led = self._guided[handed <= step]
