@@ -159,5 +159,5 @@ def test_settings_that_cannot_be_meant_are_refused(name, value):
 
 def test_settings_are_those_of_registered_environments():
     assert set(SETTINGS) <= set(IDS)
-    assert planner_settings("pbd_gym:PBDCloth-v0", horizon=7).horizon == 7
+    assert planner_settings("pbd_gym:PBDCloth-v0", horizon=45).horizon == 45
     assert planner_settings("Crane-v0") == PlannerSettings()
