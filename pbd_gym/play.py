@@ -17,7 +17,7 @@ from pbd_gym.rendering.palette import LIGHT, Colour
 Action = Callable[[Any], np.ndarray]
 
 KEYS = """arrows   left, right, down, up
-PgUp PgDn   away, towards you (in space)
+PgUp PgDn   away, nearer (in space)
 mouse   hold it down: there
 tab   which gripper: both, first, second
 a   agent on or off (with --policy)

@@ -1,15 +1,13 @@
-import json
 import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from display import DRIVERS, choose_display, hand_on
+from drawings import hanging_rope
 
-from pbd_gym.playground.drawing import Drawing, Particle, Settings, Thread
-from pbd_gym.playground.files import at_rest, load_scene, save_scene
+from pbd_gym.playground.files import at_rest, load_scene
 from pbd_gym.playground.scenes import SCENES
-from pbd_gym.playground.simulation import begin
 
 pytest.importorskip("pygame_gui")
 
@@ -41,15 +39,6 @@ def play(request, monkeypatch, tmp_path):
     yield open_app
     for app in opened:
         app.close()
-
-
-def hanging_rope():
-    """A rope that hangs still, pinned at its upper end."""
-    places = [(0.01 * k, 0.3 - 0.1 * k) for k in range(6)]  # no balance upside down
-    particles = [Particle(place, 0.05, pinned=not k) for k, place in enumerate(places)]
-    thread = Thread(tuple(range(6)), (0.1,) * 5)
-    view = ((-1.0, -1.0), (1.0, 1.0))
-    return at_rest(Drawing("Test", 2, view, tuple(particles), threads=(thread,)))
 
 
 def seen(app, particle):
@@ -282,50 +271,3 @@ def test_a_cloth_in_space_is_dragged_and_cut_and_not_drawn_upon(play):
     hand.key("4")
     hand.click((200, 200))
     assert "flat scene" in app.stage.message
-
-
-@pytest.mark.parametrize("name", [name for name in SCENES if SCENES[name]().dim == 2])
-def test_every_flat_scene_stays_finite_and_in_view(name):
-    drawing = SCENES[name]()
-    one = replace(drawing, settings=replace(drawing.settings, integrator="pbd"))
-    simulation = begin(one)
-    for _ in range(60):
-        simulation.step()
-    x = simulation.worlds["pbd"].x[0]
-    lower, upper = np.array(drawing.view)
-    assert (x > lower - 0.2).all()
-    assert (x < upper + 0.2).all()
-
-
-def test_files_that_are_no_scenes_are_refused_by_name(tmp_path):
-    path = tmp_path / "scene.json"
-    save_scene(path, hanging_rope())
-    good = json.loads(path.read_text())
-    spoilt = {
-        "not marked": {"x": []},
-        "does not exist": {"threads": [{"particles": [0, 99], "rest": [1.0]}]},
-        "gravity is": {"settings": {"gravity": 1e9}},
-        "has no 'colour'": {"colour": "red"},
-        "expected a list": {"particles": 3},
-        "coordinates": {"particles": [{"position": [0.0, 0.0, 0.0]}]},
-    }
-    for words, change in spoilt.items():
-        content = change if words == "not marked" else {**good, "drawing": good["drawing"] | change}
-        path.write_text(json.dumps(content))
-        with pytest.raises(ValueError, match=words) as caught:
-            load_scene(path)
-        assert str(path) in str(caught.value)
-    path.write_text("{")
-    with pytest.raises(ValueError, match="no scene"):
-        load_scene(path)
-
-
-def test_settings_out_of_range_are_refused():
-    for change in (
-        {"gravity": -1.0},
-        {"substeps": 2.5},
-        {"integrator": "euler"},
-        {"damping": True},
-    ):
-        with pytest.raises(ValueError, match=next(iter(change))):
-            Settings(**change)

@@ -106,6 +106,7 @@ class App:
         stage = self.stage
         if name in TOOLS:
             self.tool = TOOLS[name]()
+            self.say("")  # the tool has a hint of its own
         elif name == "Pause":
             self.paused = not self.paused
         elif name == "Slow":
