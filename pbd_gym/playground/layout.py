@@ -42,6 +42,6 @@ def lay_out(window: tuple[int, int]) -> Layout:
         window=window,
         view=pygame.Rect(0, BAR, left, bottom - _CURVE - BAR),
         curve=pygame.Rect(0, bottom - _CURVE, left, _CURVE),
-        status=pygame.Rect(MARGIN, bottom, left - 2 * MARGIN, STATUS),
+        status=pygame.Rect(MARGIN, bottom, width - 2 * MARGIN, STATUS),
         column=pygame.Rect(left + MARGIN, MARGIN - 4, COLUMN - 2 * MARGIN, height - 2 * MARGIN),
     )
