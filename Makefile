@@ -8,7 +8,7 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench accuracy roofline clean
+.PHONY: help train test lint bench accuracy roofline gallery clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -38,12 +38,16 @@ accuracy: .venv/.installed-peers ## compare error and cost with other engines
 roofline: .venv/.installed-peers ## compare the kernels' speed with C
 	$(BIN)/python benchmarks/roofline.py $(ARGS)
 
+gallery: .venv/.installed-video ## draw the README's pictures and every environment in every look
+	$(BIN)/python docs/gallery.py $(ARGS)
+
 clean: ## remove .venv, caches and build files; results of training stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/.installed-core: EXTRAS :=
 .venv/.installed-train: EXTRAS := [train,video]
+.venv/.installed-video: EXTRAS := [video]
 .venv/.installed-test: EXTRAS := [train,video,test]
 .venv/.installed-all: EXTRAS := [all]
 .venv/.installed-peers: EXTRAS := [peers]

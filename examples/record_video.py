@@ -57,7 +57,19 @@ def parse_arguments() -> argparse.Namespace:
         "--out",
         type=Path,
         default=Path("video.mp4"),
-        help="the video, .mp4 or .gif (default: %(default)s)",
+        help="the video, .mp4, .gif or .webp (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--size", type=int, default=512, help="of each world [pixels] (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--color",
+        choices=("material", "strain"),
+        default="material",
+        help="what colours tell (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--theme", choices=("light", "dark"), default="light", help="(default: %(default)s)"
     )
     parser.add_argument(
         "--seed",
@@ -124,6 +136,9 @@ def main() -> None:
         vectorization_mode="vector_entry_point",
         autoreset_mode=AutoresetMode.NEXT_STEP,  # the last frame shows how an episode ended
         render_mode="rgb_array",
+        render_size=(arguments.size, arguments.size),
+        color=arguments.color,
+        theme=arguments.theme,
     )
     env.action_space.seed(arguments.seed)
     policy = load_policy(arguments.policy, arguments.algo, env)

@@ -71,6 +71,15 @@ def test_an_mp4_is_of_the_kind_that_browsers_play(tmp_path):
     np.testing.assert_allclose(played[0][40:, 40:].mean(axis=(0, 1)), (0, 114, 178), atol=4)
 
 
+def test_a_webp_holds_every_frame(tmp_path):
+    path = tmp_path / "film.webp"
+    write_all(VideoWriter(path, 20), moving_block(7))
+    data = path.read_bytes()
+    assert data[:4] == b"RIFF"
+    assert data[8:12] == b"WEBP"
+    assert data.count(b"ANMF") == 7
+
+
 def test_views_of_a_larger_picture_can_be_written(tmp_path):
     path = tmp_path / "film.gif"
     picture = np.random.default_rng(0).integers(0, 256, (96, 128, 3), dtype=np.uint8)
@@ -141,7 +150,7 @@ def test_a_finished_video_takes_no_more_frames(tmp_path):
 @pytest.mark.parametrize(
     ("name", "fps", "message"),
     [
-        ("film.avi", 30, "ends with '.avi'; allowed are .mp4, .gif"),
+        ("film.avi", 30, "ends with '.avi'; allowed are .mp4, .gif, .webp"),
         ("film", 30, "ends with ''"),
         ("film.mp4", 0, "fps is 0"),
         ("film.mp4", float("nan"), "fps is nan"),

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pygame
 
 _READABLE = 13  # height of the smallest writing [pixels]
+_LEAST_UNIT = 0.2  # thinner lines could not be seen in small pictures [pixels]
 _FOR_WRITING = 200  # least side of a picture that has room for it [pixels]
 _EVERYWHERE = 1e7  # coordinates are kept within, so that they fit whole numbers [pixels]
 
@@ -51,14 +52,15 @@ class Canvas:
 
     Attributes:
         size: As given.
-        unit: 1/512 of the picture's smaller side [pixels]: what is not measured in metres, such as
-            the width of a line, is measured in units and so looks alike at every size.
+        unit: 1/512 of the picture's smaller side, but at least 0.2 [pixels]: what is not measured
+            in metres, such as the width of a line, is measured in units and so looks alike at
+            every size.
         picture: What is drawn, (height, width, 3) uint8.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
         width, height = self.size = size
-        self.unit = min(size) / 512.0
+        self.unit = max(min(size) / 512.0, _LEAST_UNIT)
         self.picture = np.zeros((height, width, 3), dtype=np.uint8)
         self._background = self.picture.copy()
         self._coverage = np.zeros((height, width), dtype=np.float32)
@@ -249,8 +251,13 @@ def _writing(words: str, height: int) -> np.ndarray:
     import pygame
 
     pygame.font.init()
-    label = pygame.font.Font(None, height).render(words, True, (255, 255, 255))
-    return pygame.surfarray.array_alpha(label).T.astype(np.float32) / np.float32(255.0)
+    # Four times as large and averaged: letters of few pixels are bent to whole ones.
+    label = pygame.font.Font(None, 4 * height).render(words, True, (255, 255, 255))
+    ink = pygame.surfarray.array_alpha(label).T.astype(np.float32) / np.float32(255.0)
+    rows, columns = (-(-side // 4) for side in ink.shape)
+    whole = np.zeros((4 * rows, 4 * columns), dtype=np.float32)
+    whole[: ink.shape[0], : ink.shape[1]] = ink
+    return whole.reshape(rows, 4, columns, 4).mean(axis=(1, 3))
 
 
 def _smoothed(values: np.ndarray) -> np.ndarray:

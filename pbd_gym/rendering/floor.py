@@ -14,8 +14,6 @@ from pbd_gym.rendering.marks import WRITING
 from pbd_gym.rendering.palette import Theme
 from pbd_gym.rendering.scene import Segment, round_length
 
-_TIMES = 3  # samples along a side of a pixel
-
 
 def paint_floor(
     canvas: Canvas,
@@ -29,10 +27,11 @@ def paint_floor(
     theme = look.colours
     tile = round_length(float(np.max(view[1] - view[0])) / 6.0)
     width, height = canvas.size
-    fine = replace(camera, focal_length=camera.focal_length * _TIMES, middle=camera.middle * _TIMES)
-    size = (width * _TIMES, height * _TIMES)
+    times = 3 if max(canvas.size) <= 512 else 2  # samples along a side of a pixel
+    fine = replace(camera, focal_length=camera.focal_length * times, middle=camera.middle * times)
+    size = (width * times, height * times)
     pixels = floor_pixels(fine, size, view, (room.lower, room.upper), tile, theme)
-    samples = pixels.reshape(height, _TIMES, width, _TIMES, 3)
+    samples = pixels.reshape(height, times, width, times, 3)
     mean = np.rint(samples.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
     canvas.paste(mean)
     for rail in rails:

@@ -29,12 +29,13 @@ _GIF = (
     "[b][p]paletteuse=dither=bayer:bayer_scale=5:diff_mode=rectangle",
     *("-loop", "0"),
 )
-_FORMATS = {".mp4": _MP4, ".gif": _GIF}
+_WEBP = ("-c:v", "libwebp_anim", "-q:v", "80", "-loop", "0")
+_FORMATS = {".mp4": _MP4, ".gif": _GIF, ".webp": _WEBP}
 _MAX_GIF_FPS = 50  # viewers play frames of less than 2/100 s slowly, at 10 frames per second
 
 
 class VideoWriter:
-    """Writes frames to a video, MP4 (H.264) or GIF by the suffix of the path.
+    """Writes frames to a video, MP4 (H.264), GIF or WebP by the suffix of the path.
 
     The file appears when the with-block ends without an exception; otherwise nothing is left.
 
