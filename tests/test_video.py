@@ -232,3 +232,20 @@ def test_the_example_films_a_policy(tmp_path):
     about, played = read(tmp_path / "film.mp4")
     assert about["size"] == (2 * 512 + 2, 512)
     assert len(played) == 2 * (100 + 1)  # with the first frame of each round
+
+
+def test_stable_baselines3_films_a_batch(tmp_path):
+    pytest.importorskip("moviepy")
+    recorders = pytest.importorskip("stable_baselines3.common.vec_env")
+    from pbd_gym.sb3 import make_sb3_vec_env
+
+    look = {"render_mode": "rgb_array", "render_size": (64, 64)}
+    batch = make_sb3_vec_env("pbd_gym:PBDRope-v0", 4, seed=0, **look)
+    recorder = recorders.VecVideoRecorder(batch, str(tmp_path), lambda step: step == 0, 5)
+    recorder.reset()
+    for _ in range(7):
+        recorder.step(np.zeros((4, 2), np.float32))
+    recorder.close()
+    (film,) = tmp_path.glob("*.mp4")
+    about, _ = read(film)
+    assert about["size"] == (128, 128)  # four worlds side by side
