@@ -8,10 +8,10 @@ import numpy as np
 
 from pbd_gym.physics.model import Model
 
-# Candidate pairs of self-collision that a world can hold, per particle.
+# Pairs of self-collision that a world can list in a control step, and for each particle of a large
+# cloth. Memory that is never written takes no space.
+_PAIRS = 524_288
 _PAIRS_PER_PARTICLE = 24
-# Candidate encounters that a world can hold, per particle that can meet another.
-_ENCOUNTERS_PER_PARTICLE = 64
 
 
 def allocate(model: Model, lanes: int, width: int, dtype: np.dtype) -> tuple[Any, ...]:
@@ -31,7 +31,8 @@ def _pairs(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, ...] 
     """Return scratch of self-collision, see `find_pairs`."""
     if model.self_collision is None:
         return None
-    capacity = _PAIRS_PER_PARTICLE * len(model.self_collision.particles)
+    count = len(model.self_collision.particles)
+    capacity = min(count * (count - 1) // 2, max(_PAIRS, _PAIRS_PER_PARTICLE * count))
     pairs = np.zeros((lanes, capacity, 3), dtype=np.int32)
     return pairs, np.zeros(lanes, dtype=np.int64), np.zeros((1, lanes), dtype=dtype)
 
@@ -41,7 +42,8 @@ def _encounters(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, 
     table = model.encounters
     if table is None:
         return None
-    capacity = min(len(table.particles), _ENCOUNTERS_PER_PARTICLE * len(table.movers))
+    capacity = len(table.particles)
     indices = np.zeros((lanes, capacity, 2), dtype=np.int32)
-    speeds = np.zeros((lanes, capacity), dtype=dtype)
-    return indices, np.zeros(lanes, dtype=np.int64), speeds, np.zeros((2, lanes), dtype=dtype)
+    contacts = np.zeros((lanes * capacity, 2 + model.dim), dtype=dtype)
+    scratch = np.zeros((2, lanes), dtype=dtype)
+    return indices, np.zeros(lanes, dtype=np.int64), contacts, scratch

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..compiling import kernel, row
 from .forces import COLLIDERS, CONTACTS, force_row, note_move
-from .layout import DIM, GAP, LANES, NORMAL, POSITION, SHARE, START, VELOCITY
+from .layout import DIM, GAP, LANES, NORMAL, POSITION, SETTLED, SHARE, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
 # The kinds of shapes; a sphere is a capsule whose ends coincide.
@@ -22,10 +22,11 @@ _PARTING_SPEED = 1.0
 
 @kernel
 def collide_with_shapes(work, masses, colliders, timing, forces):
-    """Put every free particle back outside the shapes, one shape after another."""
+    """Put every free particle of lanes not yet settled back outside, one shape after another."""
     if colliders is None:
         return
     kinds, pins = colliders.kinds, colliders.pins
+    marks = row(work, work.shape[0] - 2)
     for shape in range(kinds.shape[0]):
         kind = kinds[shape]
         first, second = _carrier(work, pins[shape, 0]), _carrier(work, pins[shape, 1])
@@ -48,7 +49,8 @@ def collide_with_shapes(work, masses, colliders, timing, forces):
                         force_row(forces, CONTACTS, particle),
                     )
                     for lane in range(LANES):
-                        if at[GAP + lane] < 0 and in_lane(w, at, lane) > 0:
+                        inside = at[GAP + lane] < 0 and marks[SETTLED + lane] == 0
+                        if inside and in_lane(w, at, lane) > 0:
                             _put_outside(at, first, second, lane, colliders, shape, timing, w, told)
 
 

@@ -26,8 +26,8 @@ _PRESSURE = 2.0
 def find_pairs(work, masses, collision, found, dt):
     """List, for every lane, the pairs that can come into contact within the control step.
 
-    found: pairs (LANES, capacity, 3), their number (LANES,) and scratch (1, LANES). What exceeds
-    the capacity is left out (the capacity is several times what a crumpled cloth needs).
+    found: pairs (LANES, capacity, 3), their number (LANES,) and scratch (1, LANES). There is room
+    for all pairs of 1024 particles; of more, the pairs that are left out are the last ones.
     """
     if collision is None:
         return

@@ -4,15 +4,16 @@ import numpy as np
 
 from ..compiling import kernel, row
 from .forces import CONTACTS, WALLS, force_row, note_move
-from .layout import DIM, LANES, MULTIPLIER, POSITION, START, VELOCITY
+from .layout import DIM, LANES, MULTIPLIER, POSITION, SETTLED, START, VELOCITY
 from .masses import in_lane, inverse_mass_of, is_grabbed
 
 
 @kernel
 def collide_with_walls(work, masses, room, forces):
-    """Put every free particle back into the room, with friction."""
+    """Put every free particle of lanes not yet settled back into the room, with friction."""
     inverse_mass, lower_wall, upper_wall = masses.inverse_mass, room.lower, room.upper
     radius, friction, kinetic = room.radius, room.friction, room.kinetic_friction
+    marks = row(work, work.shape[0] - 2)
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
             at, mass = row(work, particle), inverse_mass_of(masses, particle)
@@ -21,7 +22,9 @@ def collide_with_walls(work, masses, room, forces):
             for axis in range(DIM):
                 if lower_wall[axis] > -np.inf or upper_wall[axis] < np.inf:
                     lower, upper = lower_wall[axis] + radius, upper_wall[axis] - radius
-                    _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force, normal)
+                    _stop_at_walls(
+                        at, mass, marks, axis, lower, upper, friction, kinetic, force, normal
+                    )
 
 
 @kernel
@@ -57,7 +60,7 @@ def _read_off(at, mass, axis, h, lanes):
 
 
 @kernel
-def _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force, normal):
+def _stop_at_walls(at, mass, marks, axis, lower, upper, friction, kinetic, force, normal):
     """Clamp one coordinate; Coulomb friction holds back the others.
 
     Macklin et al. 2014, eq. 23-24. In two loops over the lanes: LLVM does not vectorise one that
@@ -67,7 +70,8 @@ def _stop_at_walls(at, mass, axis, lower, upper, friction, kinetic, force, norma
     one, zero = real(1), real(0)
     for lane in range(LANES):
         before = at[POSITION + axis * LANES + lane]
-        after = before if is_grabbed(mass, at, lane) else min(max(before, lower), upper)
+        stays = is_grabbed(mass, at, lane) or marks[SETTLED + lane] > zero
+        after = before if stays else min(max(before, lower), upper)
         at[MULTIPLIER + lane] = abs(after - before)
         at[POSITION + axis * LANES + lane] = after
         w = in_lane(mass, at, lane)

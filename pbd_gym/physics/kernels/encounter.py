@@ -4,112 +4,103 @@ An encounter is a particle c and a link from a to b (a = b where there is none: 
 With the nearest point p = (1 - t) x_a + t x_b, the constraint is C = |x_c - p| - distance >= 0; its
 gradients are n, -(1 - t) n and -t n, so that no collision changes the momentum of what collides.
 
-Encounters that can come about are listed once per control step; contacts are solved in every
-substep, world by world, in the order in which they were listed.
+Contacts are solved in every substep, world by world, there and back through the list of those that
+can come about, until that moves nothing. Two balls on the ground show why: friction takes back how
+the upper one slides, moving both by half; the ground takes back the lower one's half, and the upper
+one has slid by the other. Each sweep leaves half of that.
 """
 
 import numpy as np
 
 from ..compiling import kernel, row
 from .forces import ENCOUNTERS, note_contact, note_normal
-from .layout import DIM, LANES, NORMAL, POSITION, START, VELOCITY
+from .layout import DIM, LANES, NORMAL, POSITION, SETTLED, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
 # Speed at which what overlaps is let apart [m/s].
 _PARTING_SPEED = 1.0
-# Speeds may grow within a control step, as light things are hit by heavy ones.
-_SPEED_UP = 2.0
+# Share of g h^2 by which a sweep may still move what is settled.
+_STILL = 1e-3
+# Where the quantities of a contact stand in its row: sum of what it has pushed in the substep,
+# speed at which it may part, sum of its friction.
+PUSH, SPEED, RUB = 0, 1, 2
 # How an encounter touches.
 _APART, _RESTS, _BOUNCES = 0, 1, 2
 
 
 @kernel
-def list_encounters(work, encounters, listed, timing):
-    """List, for every lane, the encounters that can come about within the control step.
+def collide_with_others(work, masses, encounters, listed, timing, sweep, forces):
+    """Sweep over what is listed; return whether there is a lane to sweep again.
 
-    listed: their indices and how they touch (LANES, capacity, 2), their number (LANES,), speeds at
-    which they may part (LANES, capacity) [m/s], and scratch (2, LANES). What exceeds the capacity
-    is left out.
+    A lane is settled, and left alone, when nothing touches or when a sweep has moved nothing by
+    more than a small share of what gravity moves in a substep: what is left of it in every substep
+    is the speed at which a stack creeps.
     """
     if encounters is None:
+        return False
+    marks = row(work, work.shape[0] - 2)
+    still = work.dtype.type(_STILL) * timing.gravity * timing.h * timing.h
+    unsettled = False
+    for lane in range(LANES):
+        if sweep == 0:
+            marks[SETTLED + lane] = 0
+        if marks[SETTLED + lane] == 0:
+            touches, greatest = _sweep(
+                work, masses, encounters, listed, timing, sweep, lane, forces
+            )
+            if not touches or (sweep > 0 and greatest <= still):
+                marks[SETTLED + lane] = 1
+            else:
+                unsettled = True
+    return unsettled
+
+
+@kernel
+def unsettle(work, encounters):
+    """Forget which lanes are settled."""
+    if encounters is None:
         return
-    indices, counts, _, scratch = listed
-    travel, beyond = row(scratch, 0), row(scratch, 1)
-    _measure_travel(work, encounters.movers, travel, timing.dt, timing.gravity)
+    marks = row(work, work.shape[0] - 2)
     for lane in range(LANES):
-        counts[lane] = 0
-    for index in range(encounters.reach.shape[0]):
-        c = row(work, encounters.particles[index])
-        a, b = row(work, encounters.links[index, 0]), row(work, encounters.links[index, 1])
-        if _can_meet(c, a, b, encounters.reach[index], travel, beyond):
-            for lane in range(LANES):
-                if beyond[lane] < 0 and counts[lane] < indices.shape[1]:
-                    indices[lane, counts[lane], 0] = index
-                    counts[lane] += 1
+        marks[SETTLED + lane] = 0
 
 
 @kernel
-def _measure_travel(work, movers, travel, dt, gravity):
-    """Write by how much two things can approach within a control step, in every lane [m]."""
-    real = type(dt)
-    for lane in range(LANES):
-        travel[lane] = real(0)
-    for index in range(movers.shape[0]):
-        at = row(work, movers[index])
-        for lane in range(LANES):
-            square = real(0)
-            for k in range(DIM):
-                square += at[VELOCITY + k * LANES + lane] * at[VELOCITY + k * LANES + lane]
-            travel[lane] = max(travel[lane], square)
-    for lane in range(LANES):
-        travel[lane] = real(2 * _SPEED_UP) * (np.sqrt(travel[lane]) + gravity * dt) * dt
-
-
-@kernel
-def _can_meet(c, a, b, reach, travel, beyond):
-    """Tell whether a particle can come to a link in any lane: where `beyond` [m2] is negative."""
-    real = type(reach)
-    half, zero, near = real(0.5), real(0), False
-    for lane in range(LANES):
-        square = zero
-        for k in range(DIM):
-            at = POSITION + k * LANES + lane
-            delta = c[at] - half * (a[at] + b[at])
-            square += delta * delta
-        beyond[lane] = square - (reach + travel[lane]) * (reach + travel[lane])
-        near |= beyond[lane] < zero
-    return near
-
-
-@kernel
-def collide_with_others(work, masses, encounters, listed, timing, sweep, forces):
-    """Push apart what is listed and too close, with friction, and note how it touches.
+def _sweep(work, masses, encounters, listed, timing, sweep, lane, forces):
+    """Solve each contact of a lane; return whether there are any, and the greatest move [m].
 
     What began the substep too close is let apart at `_PARTING_SPEED` only (Macklin et al. 2019, eq.
     10): pushed out at once, it would fly apart at depth/h.
     """
-    if encounters is None:
-        return
-    indices, counts, speeds, _ = listed
-    parting = work.dtype.type(_PARTING_SPEED) * timing.h
-    for lane in range(LANES):
-        for entry in range(counts[lane]):
-            index = indices[lane, entry, 0]
-            if sweep == 0:
-                indices[lane, entry, 1] = _APART
-            c, a, b = _rows(work, encounters, index)
-            t = _nearest(c, a, b, lane)
-            weights = _weights(masses, encounters, index, c, a, b, t, lane)
-            distance = encounters.distance[index]
-            if _length(c, a, b, POSITION, t, lane) < distance and weights[3] > 0:
-                before = _length(c, a, b, START, t, lane)
-                target = min(distance, before + parting)
-                depth = target - _measure(c, a, b, t, lane)
-                if indices[lane, entry, 1] == _APART:
-                    touch, speed = _meet(c, a, b, lane, t, encounters, index, timing)
-                    indices[lane, entry, 1], speeds[lane, entry] = touch, speed
-                told = _told(forces, encounters, index, t)
-                _push_apart(c, a, b, lane, t, weights, depth, encounters.friction[index], told)
+    indices, counts, contacts, _ = listed
+    real = work.dtype.type
+    zero, parting = real(0), real(_PARTING_SPEED) * timing.h
+    touches, greatest = False, zero
+    for step in range(counts[lane]):
+        entry = step if sweep % 2 == 0 else counts[lane] - 1 - step
+        index = indices[lane, entry, 0]
+        contact = row(contacts, lane * indices.shape[1] + entry)
+        if sweep == 0:
+            indices[lane, entry, 1] = _APART
+            for k in range(RUB + DIM):
+                contact[k] = zero
+        c, a, b = _rows(work, encounters, index)
+        t = _nearest(c, a, b, lane)
+        distance = encounters.distance[index]
+        if contact[PUSH] == zero and _length(c, a, b, POSITION, t, lane) >= distance:
+            continue
+        weights = _weights(masses, encounters, index, c, a, b, t, lane)
+        if weights[3] > zero:
+            target = min(distance, _length(c, a, b, START, t, lane) + parting)
+            depth = target - _measure(c, a, b, t, lane)
+            if indices[lane, entry, 1] == _APART:
+                touch, speed = _meet(c, a, b, lane, t, encounters, index, timing)
+                indices[lane, entry, 1], contact[SPEED] = touch, speed
+            friction = encounters.friction[index]
+            told = _told(forces, encounters, index, t)
+            move = _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told)
+            touches, greatest = True, max(greatest, move)
+    return touches, greatest
 
 
 @kernel
@@ -121,13 +112,14 @@ def part_from_others(work, masses, encounters, listed, h, forces):
     """
     if encounters is None:
         return
-    indices, counts, speeds, _ = listed
+    indices, counts, contacts, _ = listed
     for lane in range(LANES):
         for entry in range(counts[lane]):
             touch = indices[lane, entry, 1]
             if touch == _APART:
                 continue
-            index, speed = indices[lane, entry, 0], speeds[lane, entry]
+            index = indices[lane, entry, 0]
+            speed = row(contacts, lane * indices.shape[1] + entry)[SPEED]
             c, a, b = _rows(work, encounters, index)
             t = _nearest(c, a, b, lane)
             weights = _weights(masses, encounters, index, c, a, b, t, lane)
@@ -243,27 +235,40 @@ def _meet(c, a, b, lane, t, encounters, index, timing):
 
 
 @kernel
-def _push_apart(c, a, b, lane, t, weights, depth, friction, told):
-    """Part a particle and a link by a depth [m].
+def _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told):
+    """Part a particle and a link by a depth [m]; return by how much they moved [m].
 
-    Friction takes back the sideways motion as far as the push can hold it (Macklin et al. 2014, eq.
-    23-24).
+    The contact keeps the sums of its impulses in the substep. That of its pushes may not pull.
+    Friction takes back the sideways motion as far as that sum can hold it (Macklin et al. 2014, eq.
+    23-24): held by the little that a later sweep adds to the push, it would let go there, and a
+    stack would creep at g h sin(slope)/(2^sweeps - 1).
     """
-    push = max(depth, depth * 0)
-    way, square = depth * 0, depth * 0
+    push = max(contact[PUSH] + depth / weights[3], depth * 0)
+    way, square, moved = depth * 0, depth * 0, depth * 0
     for k in range(DIM):
         way += _normal(c, k, lane) * _motion(c, a, b, t, k, lane)
     for k in range(DIM):
-        slide = _motion(c, a, b, t, k, lane) - way * _normal(c, k, lane)
-        square += slide * slide
-    slid, held = np.sqrt(square), friction * push
-    share = held / slid if slid > held else push * 0 + 1
-    note_normal(told, lane, push / weights[3])
+        rub = _rub(c, a, b, lane, t, weights, way, contact, k)
+        square += rub * rub
+    wanted, held = np.sqrt(square), friction * push
+    share = held / wanted if wanted > held else depth * 0 + 1
+    note_normal(told, lane, push - contact[PUSH])
     for k in range(DIM):
-        slide = _motion(c, a, b, t, k, lane) - way * _normal(c, k, lane)
-        move = (push * _normal(c, k, lane) - share * slide) / weights[3]
+        rub = share * _rub(c, a, b, lane, t, weights, way, contact, k)
+        move = (push - contact[PUSH]) * _normal(c, k, lane) + rub - contact[RUB + k]
+        contact[RUB + k] = rub
         _move(c, a, b, POSITION + k * LANES + lane, weights, move)
         note_contact(told, k * LANES + lane, move)
+        moved = max(moved, abs(move) * weights[3])
+    contact[PUSH] = push
+    return moved
+
+
+@kernel
+def _rub(c, a, b, lane, t, weights, way, contact, k):
+    """Return the impulse of friction that takes back all sideways motion, along axis k [kg m]."""
+    slide = _motion(c, a, b, t, k, lane) - way * _normal(c, k, lane)
+    return contact[RUB + k] - slide / weights[3]
 
 
 @kernel

@@ -28,6 +28,7 @@ KEPT = MASS + LANES  # position that a failed solve must not touch
 # In the row before the last:
 FAILED = 0  # 1 where a second-order solve has failed
 TOO_FAST = LANES  # 1 where a control step has ended beyond the speed limit
+SETTLED = 2 * LANES  # 1 where contacts between bodies have been solved
 
 # In the row of sums, those of an area or volume:
 CONTENT = 0  # area or volume, then the multiplier

@@ -6,7 +6,7 @@ from .chain import project_chain_velocities, project_chains, project_chains_from
 from .collider import collide_with_shapes
 from .collision import collide_with_self, find_pairs, rub_against_self
 from .contact import collide_with_walls, read_velocities
-from .encounter import collide_with_others, list_encounters, part_from_others
+from .encounter import collide_with_others, part_from_others, unsettle
 from .fallback import (
     has_failed,
     is_too_fast,
@@ -21,6 +21,7 @@ from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
 from .limit import project_limits
 from .masses import inverse_mass_of, is_grabbed
 from .matching import match_shapes
+from .meeting import list_encounters
 from .rod import project_rods
 from .rope import finish_ropes, project_ropes
 from .sweep import (
@@ -35,6 +36,8 @@ from .volume import project_volumes
 
 # Iterations of the first-order solve that replaces a failed one.
 _AGAIN = 4
+# Most sweeps over the contacts between bodies in a substep.
+_CONTACT_SWEEPS = 32
 
 __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
@@ -172,15 +175,17 @@ def _project_again(work, model, found, timing, second_order, forces):
 
 @in_place
 def _collide_with_others(work, model, encounters, listed, timing, forces):
-    """Part what collides, what stands on the ground before what stands on that."""
+    """Part what collides and what stands on the ground, in turn, until both are settled."""
     if encounters is None:
         return
     masses = model.particles
-    for sweep in range(model.iterations):
+    for sweep in range(max(model.iterations, _CONTACT_SWEEPS)):
         if sweep > 0:
             collide_with_shapes(work, masses, model.colliders, timing, forces)
             collide_with_walls(work, masses, model.room, forces)
-        collide_with_others(work, masses, encounters, listed, timing, sweep, forces)
+        if not collide_with_others(work, masses, encounters, listed, timing, sweep, forces):
+            break
+    unsettle(work, encounters)
 
 
 @in_place
