@@ -73,6 +73,9 @@ class ContactBuilder(ParticleBuilder):
     ) -> None:
         """Keep particles apart from each other.
 
+        All pairs of up to 1024 particles can be near each other at once; of more particles, some
+        hundreds of thousands of pairs, beyond which the last ones are not seen.
+
         Args:
             particles: Particles, each once.
             distance: That they keep [m]; at most the smallest distance as placed.

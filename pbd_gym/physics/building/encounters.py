@@ -15,8 +15,8 @@ from pbd_gym.physics.tables import Encounters
 # Parts of one body that were placed closer than this many collision distances are neighbours: its
 # own constraints hold them apart.
 _NEIGHBOURHOOD = 3.0
-# More would take longer to look through than a step has time.
-_MOST = 2_000_000
+# More would take longer to look through than a step has time. All of them have room in the lists.
+_MOST = 1_000_000
 
 
 class _Group(NamedTuple):
@@ -50,14 +50,15 @@ class EncounterBuilder(ParticleBuilder):
         """Let a body collide with all others that are added so, and with itself if wanted.
 
         A body is made of balls (discs in the plane) around its particles, and of the links between
-        them, as thick. Particles of one body do not pass its links, nor those of another. Two links
-        whose ends are apart can cross in space: nothing passes there if the radius is at least half
-        the links' length, which goes for bodies without links too. In the plane links suffice.
+        them, as thick. Particles of one body do not pass its links, nor those of another: in the
+        plane nothing passes then. In space two links could cross with their ends apart: r_a + r_b
+        must be more than half of the shorter one, for any two links as placed. Links are no faces:
+        balls pass the meshes of a net unless r_a + r_b is more than half its longest link.
 
         What collides keeps its momentum. What moves relatively by more than 2 (r_a + r_b) within a
         substep can pass unseen. What overlaps is let apart at 1 m/s and keeps no speed of that.
-        Where much lies on each other, more `iterations` make contacts stiffer. Particles do not
-        turn: a stack that friction alone keeps from toppling creeps by some mm/s.
+        Contacts are swept over up to 32 times a substep, or `iterations` times if that is more,
+        until they are settled: what stands by its friction stays. Particles do not turn.
 
         Args:
             particles: Of the body, each once and in no other body.
@@ -94,6 +95,8 @@ class EncounterBuilder(ParticleBuilder):
             return None
         if len(rows) > _MOST:
             raise ValueError(f"there are {len(rows)} possible encounters; allowed: {_MOST}")
+        if self.dim == 3:
+            self._check_that_links_do_not_cross()
         corners = rows[:, :3].astype(np.int64)
         points = np.array(self._positions)[corners]
         length = np.sqrt(np.sum((points[:, 1] - points[:, 2]) ** 2, axis=1))
@@ -106,6 +109,22 @@ class EncounterBuilder(ParticleBuilder):
             friction=rows[:, 4].copy(),
             restitution=rows[:, 5].copy(),
         )
+
+    def _check_that_links_do_not_cross(self) -> None:
+        """Refuse bodies in space whose links can pass each other between their ends.
+
+        Where two links cross, an end of each is within half its length of the other link.
+        """
+        points = np.array(self._positions)
+        longest = [_longest(points, group.links) for group in self._groups]
+        for i, one in enumerate(self._groups):
+            for j in range(i if one.within else i + 1, len(self._groups)):
+                distance, shorter = one.radius + self._groups[j].radius, min(longest[i], longest[j])
+                if shorter > 0.0 and distance <= shorter / 2.0:
+                    raise ValueError(
+                        f"collisions {i} and {j} keep {distance} m apart and have links of "
+                        f"{shorter} m, which could cross; allowed: more than {shorter / 2.0} m"
+                    )
 
     def _within(self, group: _Group) -> np.ndarray:
         """Return the encounters of a body with itself."""
@@ -147,6 +166,12 @@ def _between(one: _Group, other: _Group) -> np.ndarray:
 
 def _all_with_all(particles: np.ndarray, links: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.repeat(particles, len(links)), np.tile(links, (len(particles), 1))
+
+
+def _longest(points: np.ndarray, links: np.ndarray) -> float:
+    """Return the length of the longest link as placed, 0 without links [m]."""
+    ends = points[links]
+    return float(np.sqrt(np.sum((ends[:, 0] - ends[:, 1]) ** 2, axis=1)).max(initial=0.0))
 
 
 def _rows(particles: np.ndarray, links: np.ndarray, one: _Group, other: _Group) -> np.ndarray:
