@@ -127,7 +127,7 @@ def part_from_others(work, masses, encounters, listed, h, forces):
             parting = speed * 0
             for k in range(DIM):
                 parting += _normal(c, k, lane) * _apart(c, a, b, VELOCITY, t, k, lane)
-            if touch == _BOUNCES or parting > speed:
+            if weights[3] > 0 and (touch == _BOUNCES or parting > speed):
                 told, change = _told(forces, encounters, index, t), (speed - parting) / weights[3]
                 note_normal(told, lane, change * h)
                 for k in range(DIM):
