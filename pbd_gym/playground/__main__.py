@@ -25,7 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     except (OSError, ValueError) as error:
         parser.error(str(error))
     try:
-        import pygame_gui  # noqa: F401
+        import pygame_gui  # noqa: F401  (asks before a window opens whether it is there)
     except ImportError:
         print('the playground needs pygame_gui: pip install "pbd-gym[playground]"', file=sys.stderr)
         return 1
