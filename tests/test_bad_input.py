@@ -271,6 +271,13 @@ def test_an_ended_world_is_not_stepped_where_autoreset_is_disabled():
     env.step(action)
 
 
+def test_staggering_is_on_or_off_and_needs_a_time_limit():
+    with pytest.raises(TypeError, match="stagger is 'half'; expected True or False"):
+        three(stagger="half")
+    with pytest.raises(ValueError, match="stagger is True; without max_episode_steps"):
+        three(max_episode_steps=None, stagger=True)
+
+
 @pytest.mark.parametrize("mode", ["SOMETIMES", "same_step", None, 3])
 def test_an_unknown_autoreset_mode_is_refused(mode):
     with pytest.raises(ValueError, match=f"autoreset_mode is {mode!r}; allowed: NEXT_STEP"):

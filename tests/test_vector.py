@@ -213,6 +213,32 @@ def test_a_batch_without_a_limit_goes_on():
     assert not np.any(ends)
 
 
+def test_staggered_first_episodes_end_evenly_spread_and_later_ones_are_whole():
+    limit = 10
+    env = make_vec(
+        "PBDRope-v0", 5, max_episode_steps=limit, autoreset_mode="SAME_STEP", stagger=True
+    )
+    env.reset(seed=0)
+    ends = [np.flatnonzero(env.step(env.action_space.sample())[3]) for _ in range(2 * limit)]
+    env.close()
+    assert [(step + 1, *worlds) for step, worlds in enumerate(ends) if len(worlds)] == [
+        (2, 4), (4, 3), (6, 2), (8, 1), (10, 0), (12, 4), (14, 3), (16, 2), (18, 1), (20, 0)
+    ]  # fmt: skip
+
+
+def test_worlds_reset_by_a_mask_are_not_staggered():
+    env = make_vec("PBDRope-v0", 2, max_episode_steps=4, autoreset_mode="DISABLED", stagger=True)
+    env.reset(seed=0)
+    for _ in range(2):
+        truncated = env.step(env.action_space.sample())[3]
+    assert truncated.tolist() == [False, True]
+    env.reset(options={"reset_mask": np.array([False, True])})
+    for _ in range(2):
+        truncated = env.step(env.action_space.sample())[3]
+    env.close()
+    assert truncated.tolist() == [True, False]
+
+
 def test_a_world_that_diverges_is_terminated_without_reward():
     batch = make_vec("PBDRope-v0", 5, task=FragileRope, autoreset_mode="SAME_STEP")
     batch.reset(seed=11)

@@ -51,7 +51,8 @@ class Training:
         )
         self._evaluation_env.reset()
         self._checkpoint = checkpoint
-        env = make_sb3_vec_env(config.env, config.num_envs, **config.env_kwargs)
+        # Staggered, as rollouts of one and the same part of an episode teach PPO little.
+        env = make_sb3_vec_env(config.env, config.num_envs, stagger=True, **config.env_kwargs)
         if checkpoint is None:
             self.curve = LearningCurve()
             self.model: BaseAlgorithm = algorithm_class(config.algo)(

@@ -37,6 +37,9 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         theme: "light" or "dark".
         show: Any of "scale", "clock" and "trail".
         num_threads: Threads that share the worlds; chosen by the size of the batch where None.
+        stagger: Whether a full `reset` cuts the first episode of world i short by the share
+            i / num_envs, so that not all episodes end at once. On-policy learners then see all
+            parts of an episode in each rollout.
         **arguments: The task's configuration, see its class.
 
     Raises:
@@ -61,6 +64,7 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         theme: str = "light",
         show: Sequence[str] = ("scale",),
         num_threads: int | None = None,
+        stagger: bool = False,
         **arguments: Any,
     ) -> None:
         if render_mode == "human":
@@ -75,6 +79,7 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         self.render_mode = render_mode
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
+        self._skipped = _skipped_steps(stagger, num_envs, max_episode_steps)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {
             "render_modes": ["rgb_array"],
@@ -113,6 +118,8 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         generators = self._seeded(seed, mask)
         self._begin(np.flatnonzero(mask), generators, fixed)
         self._generators = generators
+        if mask.all():
+            self._elapsed[:] = self._skipped
         return self._batch.observe(), {}
 
     def _begin(
@@ -258,6 +265,17 @@ def _check_count(name: str, value: Any) -> None:
     """Refuse what is no positive whole number."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise ValueError(f"{name} is {value!r}; expected a whole number from 1 up")
+
+
+def _skipped_steps(stagger: Any, num_envs: int, limit: int | None) -> np.ndarray:
+    """Return how many steps the worlds' first episodes lack, (num_envs,)."""
+    if not isinstance(stagger, bool):
+        raise TypeError(f"stagger is {stagger!r}; expected True or False")
+    if not stagger:
+        return np.zeros(num_envs, dtype=np.int64)
+    if limit is None:
+        raise ValueError("stagger is True; without max_episode_steps it must be False")
+    return np.arange(num_envs) * limit // num_envs
 
 
 def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
