@@ -57,6 +57,16 @@ def write_csv(path: Path, curve: LearningCurve) -> None:
         file.write(text.getvalue().encode())
 
 
+def read_csv(path: Path) -> LearningCurve:
+    """Read back what `write_csv` wrote."""
+    curve = LearningCurve()
+    kinds = {"exploring": curve.training, "deterministic": curve.evaluations}
+    with path.open(encoding="utf-8", newline="") as file:
+        for policy, timesteps, *rest in list(csv.reader(file))[1:]:
+            kinds[policy].append(Point(int(timesteps), *map(float, rest)))
+    return curve
+
+
 def plot_learning_curve(path: Path, curve: LearningCurve, title: str) -> None:
     """Draw the curve as a PNG: rows return and success, columns steps and wall time."""
     from matplotlib.figure import Figure

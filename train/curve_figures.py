@@ -1,0 +1,72 @@
+"""Learning curves of several seeds in one figure: medians with bands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from curves import Point
+from files import write_atomically
+from scores import Score
+
+_COLORS = {"ppo": "#0072b2", "sac": "#d55e00"}
+_LEVELS = {"scripted": ("#009e73", "--"), "planner": ("#7f5aa2", ":"), "random": ("#888888", "-.")}
+
+
+def draw_curves(
+    path: Path, title: str, curves: Mapping[str, Sequence[Sequence[Point]]], scores: Sequence[Score]
+) -> None:
+    """Draw success rate and return against steps and wall time as a PNG.
+
+    Args:
+        path: Of the PNG.
+        title: Above the figure.
+        curves: Evaluations of each seed by algorithm. The line is the median over the seeds, the
+            band reaches from the least to the greatest.
+        scores: Of the same environment; untrained policies are drawn as levels.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 6), layout="constrained")
+    axes = figure.subplots(2, 2, sharex="col", sharey="row")
+    figure.suptitle(title)
+    for row, (quantity, label) in enumerate(
+        (("success_rate", "success rate"), ("mean_return", "episode return"))
+    ):
+        for column, clock in enumerate(("timesteps", "seconds")):
+            axis = axes[row, column]
+            for algorithm, runs in curves.items():
+                _draw_band(axis, algorithm, runs, clock, quantity)
+            for policy, (color, style) in _LEVELS.items():
+                values = [getattr(score, quantity) for score in scores if score.policy == policy]
+                if values:
+                    level = float(np.mean(values))
+                    axis.axhline(level, color=color, linestyle=style, linewidth=1.2, label=policy)
+            axis.grid(alpha=0.3)
+            axis.spines[["top", "right"]].set_visible(False)
+        axes[row, 0].set_ylabel(label)
+    axes[0, 0].set_ylim(-0.03, 1.03)
+    axes[1, 0].set_xlabel("environment steps [million]")
+    axes[1, 0].xaxis.set_major_formatter(lambda steps, _: f"{steps / 1e6:g}")
+    axes[1, 1].set_xlabel("wall time [s]")
+    # a level may lie at either end of the success rate; below the figure nothing is in the way
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
+    with write_atomically(path) as file:
+        figure.savefig(file, format="png", dpi=110)
+
+
+def _draw_band(
+    axis: Any, algorithm: str, runs: Sequence[Sequence[Point]], clock: str, quantity: str
+) -> None:
+    """Draw one algorithm: its seeds are interpolated at common times, as far as all of them ran."""
+    times = [[getattr(point, clock) for point in run] for run in runs]
+    values = [[getattr(point, quantity) for point in run] for run in runs]
+    start, end = max(time[0] for time in times), min(time[-1] for time in times)
+    grid = np.linspace(start, end, 200)
+    lines = [np.interp(grid, *pair) for pair in zip(times, values, strict=True)]
+    color = _COLORS[algorithm]
+    axis.fill_between(grid, np.min(lines, axis=0), np.max(lines, axis=0), color=color, alpha=0.2)
+    label = f"{algorithm.upper()}, {len(runs)} seeds"
+    axis.plot(grid, np.median(lines, axis=0), color=color, linewidth=1.8, label=label)
