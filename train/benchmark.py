@@ -59,7 +59,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         description=__doc__, epilog=EXAMPLES, formatter_class=HelpFormatter
     )
-    parser.add_argument("--env", nargs="+", choices=ENVIRONMENTS, default=ENVIRONMENTS, metavar="ID")
+    parser.add_argument(
+        "--env", nargs="+", choices=ENVIRONMENTS, default=ENVIRONMENTS, metavar="ID"
+    )
     parser.add_argument("--policy", nargs="+", choices=POLICIES, default=POLICIES, metavar="NAME")
     parser.add_argument("--seeds", type=int, default=5, metavar="N", help="(default: 5)")
     parser.add_argument(

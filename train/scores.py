@@ -55,7 +55,9 @@ def read_scores(path: Path) -> list[Score]:
     kinds = {"str": str, "int": int, "float": float}
     with path.open(encoding="utf-8", newline="") as file:
         return [
-            Score(**{field.name: kinds[str(field.type)](row[field.name]) for field in fields(Score)})
+            Score(
+                **{field.name: kinds[str(field.type)](row[field.name]) for field in fields(Score)}
+            )
             for row in csv.DictReader(file)
         ]
 

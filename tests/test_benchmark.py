@@ -1,0 +1,90 @@
+"""The comparison of policies over seeds: its statistics, what it skips, and what it writes."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
+
+import benchmark
+from curves import LearningCurve, Point, read_csv, write_csv
+from scores import Score, interquartile_mean, over_all, read_scores, table, write_scores
+
+NOTHING = (math.nan,) * 5
+
+
+def score(env="PBDRope-v0", policy="ppo", seed=0, performance=0.5, training=NOTHING):
+    return Score(env, policy, seed, 100, 0.25, performance, 12.5, *training)
+
+
+def test_the_interquartile_mean_leaves_out_the_outer_quarters():
+    estimate = interquartile_mean(np.array([-1000.0, 1.0, 2.0, 3.0, 1000.0]))
+    assert estimate.mean == 2.0
+    assert estimate.low <= 2.0 <= estimate.high
+
+
+def test_the_interval_of_equal_runs_is_a_point():
+    estimate = interquartile_mean(np.full(5, 0.7), np.full(5, 0.7))
+    assert [estimate.mean, estimate.low, estimate.high] == pytest.approx([0.7] * 3)
+
+
+def test_runs_are_resampled_within_their_environment():
+    # drawn from all ten values at random, the mean would now and then be far from one half
+    estimate = interquartile_mean(np.zeros(5), np.ones(5))
+    assert (estimate.low, estimate.mean, estimate.high) == (0.5, 0.5, 0.5)
+
+
+def test_scores_and_curves_come_back_from_their_files(tmp_path):
+    scores = [score(), score(seed=1, training=(1e6, 60.0, math.inf, math.inf, math.inf))]
+    write_scores(tmp_path / "scores.csv", scores)
+    assert repr(read_scores(tmp_path / "scores.csv")) == repr(scores)
+    curve = LearningCurve([Point(10, 0.5, 1.0, math.nan)], [Point(20, 1.5, 2.0, 0.25)])
+    write_csv(tmp_path / "curve.csv", curve)
+    assert repr(read_csv(tmp_path / "curve.csv")) == repr(curve)
+
+
+def test_the_table_tells_medians_and_what_was_not_reached():
+    times = [(1e5, 9.0, 5e4, 4.0, 6.0), (1e5, 9.0, 7e4, 5.0, math.inf)]
+    times += [(1e5, 9.0, 9e4, 7.0, math.inf)]
+    runs = [score(seed=seed, training=training) for seed, training in enumerate(times)]
+    line = table([*runs, score(policy="noop")]).splitlines()
+    assert line[2].endswith("| 12.5 [12.5, 12.5] | 70 k | 5 s | not reached |")
+    assert line[3] == "| `PBDRope-v0` | noop | 0.25 | 0.50 | 12.5 |  |  |  |"
+
+
+def test_performance_over_all_environments_is_told_by_policy():
+    scores = [score(env, "sac", seed, level) for seed in range(3) for env, level in
+              (("PBDRope-v0", 0.2), ("PBDCloth-v0", 0.4))]  # fmt: skip
+    assert over_all(scores)["sac"].mean == pytest.approx(0.3)
+
+
+def test_a_benchmark_skips_what_is_done_and_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
+    runs, results = tmp_path / "runs", tmp_path / "results"
+    options = ["--env", "PBDPendulum-v0", "--policy", "noop", "ppo", "--seeds", "1"]
+    options += ["--episodes", "2", "--total-timesteps", "4096"]
+    options += ["--log-dir", str(runs), "--results", str(results)]
+    assert benchmark.main(options) == 0
+    scores = read_scores(results / "baselines.csv")
+    assert [(row.policy, row.episodes) for row in scores] == [("noop", 2), ("ppo", 100)]
+    assert scores[1].timesteps == 4096
+    assert (results / "PBDPendulum-v0.png").read_bytes().startswith(b"\x89PNG")
+
+    asked = []
+    monkeypatch.setattr(benchmark.subprocess, "run", lambda command, check: asked.append(command))
+    assert benchmark.main(options) == 0
+    assert not asked
+    (runs / "PBDPendulum-v0-ppo-0" / "evaluation.json").unlink()
+    assert benchmark.main(options) == 0
+    assert asked[0][-2:] == ["--resume", str(runs / "PBDPendulum-v0-ppo-0")]
+    # what could not be run again stays in the table
+    assert read_scores(results / "baselines.csv")[1] == scores[1]
+
+
+def test_a_number_of_seeds_below_one_is_refused(capsys):
+    with pytest.raises(SystemExit):
+        benchmark.main(["--seeds", "0"])
+    assert "--seeds must be at least 1" in capsys.readouterr().err
