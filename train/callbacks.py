@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from checkpoint import save_checkpoint, save_model
 from curves import LearningCurve, Point
+from files import check_room
 from interrupt import InterruptRequest
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
@@ -113,6 +114,7 @@ class Checkpointer(BaseCallback):
 
     Only there are model, worlds and random generators in step, so that going on from the file is
     going on as if nothing had happened. An interrupt ends the training right after its checkpoint.
+    One is saved before the first update, too: a full disk is found before hours are spent.
 
     Attributes:
         interrupted: Whether an interrupt has ended the training.
@@ -132,7 +134,8 @@ class Checkpointer(BaseCallback):
         self.interrupted = False
 
     def _on_training_start(self) -> None:
-        self._saved_at = self.model.num_timesteps
+        self._save()
+        check_room(self._checkpoint_path)
 
     def _on_rollout_start(self) -> None:
         self.interrupted = self._interrupt.requested

@@ -122,7 +122,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--checkpoint-freq",
         type=int,
         metavar="N",
-        help="steps between checkpoints, 0 for one at the end only (default: a 10th of all)",
+        help="steps between checkpoints, 0 for start and end only (default: a 10th of all)",
     )
     watch.add_argument(
         "--video",
@@ -156,22 +156,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = vars(parser.parse_args(arguments))
     try:
         run, config, training = (resume_run if "resume" in given else start_run)(given)
+        save_config(run.config, config)
     except SETTING_ERRORS as error:
         parser.error(str(error))
-    save_config(run.config, config)
     print(f"{config.env}, {config.algo}, {config.num_envs} worlds -> {run.path}", flush=True)
-    finished = training.learn(run)
-    training.close()
-    if not finished:
-        print(
-            "\nInterrupted, the training is saved. Continue with:\n"
-            f"  {sys.executable} {sys.argv[0]} --resume {run.path}"
-        )
-        return 130  # what a shell reports for Ctrl-C
-    steps, seconds = training.model.num_timesteps, training.curve.seconds
-    print(f"{steps:,} steps in {seconds:.1f} s, {steps / seconds:,.0f} steps/s")
-    finish(run, config, video=given.get("video", True))
-    return 0
+    try:
+        finished = training.learn(run)
+        training.close()
+        if finished:
+            steps, seconds = training.model.num_timesteps, training.curve.seconds
+            print(f"{steps:,} steps in {seconds:.1f} s, {steps / seconds:,.0f} steps/s")
+            finish(run, config, video=given.get("video", True))
+            return 0
+        print("\nInterrupted, the training is saved.")
+        status = 130  # what a shell reports for Ctrl-C
+    except OSError as error:
+        print(f"\ncannot write to {run.path}: {error}", file=sys.stderr)
+        status = 1
+    if run.checkpoint.exists():
+        print(f"Continue with:\n  {sys.executable} {sys.argv[0]} --resume {run.path}")
+    return status
 
 
 def start_run(given: dict[str, Any]) -> tuple[RunDirectory, TrainingConfig, Training]:

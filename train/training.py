@@ -88,7 +88,7 @@ class Training:
             )
             self.model.learn(
                 self.config.total_timesteps - self.model.num_timesteps,
-                callback=[checkpointer, CurveRecorder(self.curve), evaluation, ProgressBar()],
+                callback=[CurveRecorder(self.curve), checkpointer, evaluation, ProgressBar()],
                 reset_num_timesteps=self._checkpoint is None,
                 log_interval=1 if self.config.algo == "ppo" else self.config.num_envs,
             )
