@@ -8,7 +8,7 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench accuracy roofline gallery clean
+.PHONY: help train test lint bench accuracy roofline baselines gallery clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -37,6 +37,9 @@ accuracy: .venv/.installed-peers ## compare error and cost with other engines
 
 roofline: .venv/.installed-peers ## compare the kernels' speed with C
 	$(BIN)/python benchmarks/roofline.py $(ARGS)
+
+baselines: .venv/.installed-train ## train and compare all policies over 5 seeds: hours, can be stopped and goes on
+	$(BIN)/python train/benchmark.py --readme README.md $(ARGS)
 
 gallery: .venv/.installed-video ## draw the README's pictures and every environment in every look
 	$(BIN)/python docs/gallery.py $(ARGS)

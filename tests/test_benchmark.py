@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
 
 import benchmark
 from curves import LearningCurve, Point, read_csv, write_csv
-from scores import Score, interquartile_mean, over_all, read_scores, table, write_scores
+from scores import Score, interquartile_mean, overall_table, read_scores, table, write_scores
 
 NOTHING = (math.nan,) * 5
 
@@ -59,7 +59,26 @@ def test_the_table_tells_medians_and_what_was_not_reached():
 def test_performance_over_all_environments_is_told_by_policy():
     scores = [score(env, "sac", seed, level) for seed in range(3) for env, level in
               (("PBDRope-v0", 0.2), ("PBDCloth-v0", 0.4))]  # fmt: skip
-    assert over_all(scores)["sac"].mean == pytest.approx(0.3)
+    assert overall_table(scores).splitlines()[-1] == "| sac | 0.30 [0.30, 0.30] |"
+
+
+def test_the_table_goes_between_its_marks_and_nowhere_else(tmp_path):
+    readme = tmp_path / "README.md"
+    readme.write_text("before\n<!-- baselines -->\nold\n<!-- /baselines -->\nafter\n")
+    benchmark.put_into(readme, "new")
+    expected = "before\n<!-- baselines -->\nnew\n<!-- /baselines -->\nafter\n"
+    assert readme.read_text() == expected
+    readme.write_text("no marks\n")
+    with pytest.raises(ValueError, match="has no <!-- baselines -->"):
+        benchmark.put_into(readme, "new")
+    assert readme.read_text() == "no marks\n"
+
+
+def test_the_table_in_the_readme_is_of_the_scores_beside_it():
+    root = Path(__file__).parents[1]
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    shown = readme.split(benchmark.MARKS[0])[1].split(benchmark.MARKS[1])[0].strip()
+    assert shown == table(read_scores(root / "docs/results/baselines.csv"))
 
 
 def test_a_benchmark_skips_what_is_done_and_goes_on_where_it_was_stopped(tmp_path, monkeypatch):

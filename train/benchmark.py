@@ -20,9 +20,10 @@ from typing import Any
 from arguments import HelpFormatter
 from curve_figures import draw_curves
 from curves import Point, read_csv
+from files import write_atomically
 from policies import BASELINES
 from run_directory import RunDirectory
-from scores import Score, over_all, read_scores, table, write_scores
+from scores import Score, overall_table, read_scores, table, write_scores
 
 from pbd_gym.hyperparams import ALGORITHMS
 
@@ -35,6 +36,7 @@ ENVIRONMENTS = (
 )
 POLICIES = (*BASELINES, *ALGORITHMS)
 SCRIPTS = Path(__file__).parent
+MARKS = "<!-- baselines -->", "<!-- /baselines -->"
 
 EXAMPLES = """\
 examples:
@@ -91,6 +93,12 @@ def build_parser() -> argparse.ArgumentParser:
         help="of table, CSV and figures (%(default)s)",
     )
     parser.add_argument(
+        "--readme",
+        type=Path,
+        metavar="FILE",
+        help="put the table between this file's <!-- baselines --> and <!-- /baselines -->",
+    )
+    parser.add_argument(
         "--report-only", action="store_true", help="run nothing, write what there is"
     )
     return parser
@@ -110,12 +118,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for seed in range(options.seeds)
     ]
     try:
+        if options.readme is not None:
+            around_marks(options.readme)  # now, not after hours
         options.results.mkdir(parents=True, exist_ok=True)
         options.log_dir.mkdir(parents=True, exist_ok=True)
         if not options.report_only:
             run_all(cells, options)
         report(cells, options)
-    except (OSError, subprocess.CalledProcessError) as error:
+    except (OSError, ValueError, subprocess.CalledProcessError) as error:
         parser.error(str(error))
     except KeyboardInterrupt:
         print("\nStopped; the same command goes on from here.")
@@ -173,12 +183,25 @@ def report(cells: Sequence[Cell], options: argparse.Namespace) -> None:
         if curves:
             levels = [score for score in ordered if score.env == env]
             draw_curves(options.results / f"{env}.png", env, curves, levels)
-    lines = [
-        f"| {policy} | {mean.mean:.2f} [{mean.low:.2f}, {mean.high:.2f}] |"
-        for policy, mean in over_all(ordered).items()
-    ]
-    print(table(ordered), "", "| policy | normalized performance over all |", sep="\n")
-    print("|---|---:|", *lines, sep="\n")
+    print(table(ordered), "", overall_table(ordered), sep="\n")
+    if options.readme is not None:
+        put_into(options.readme, table(ordered))
+
+
+def around_marks(readme: Path) -> tuple[str, str]:
+    """Return what stands before and after the table, marks included."""
+    head, _, rest = readme.read_text(encoding="utf-8").partition(MARKS[0])
+    _, mark, tail = rest.partition(MARKS[1])
+    if not mark:
+        raise ValueError(f"{readme} has no {MARKS[0]} ... {MARKS[1]} to put the table between")
+    return head + MARKS[0], MARKS[1] + tail
+
+
+def put_into(readme: Path, text: str) -> None:
+    """Replace what stands between the marks of the table."""
+    before, after = around_marks(readme)
+    with write_atomically(readme) as file:
+        file.write(f"{before}\n{text}\n{after}".encode())
 
 
 def score_of(cell: Cell, log_dir: Path) -> Score:

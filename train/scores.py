@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -43,9 +44,9 @@ def write_scores(path: Path, scores: Sequence[Score]) -> None:
     """Write one line per score."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(field.name for field in fields(Score))
+    rows.writerow(field.name for field in dataclasses.fields(Score))
     for score in scores:
-        rows.writerow(f"{x:.6g}" if isinstance(x, float) else x for x in astuple(score))
+        rows.writerow(f"{x:.6g}" if isinstance(x, float) else x for x in dataclasses.astuple(score))
     with write_atomically(path) as file:
         file.write(text.getvalue().encode())
 
@@ -56,7 +57,10 @@ def read_scores(path: Path) -> list[Score]:
     with path.open(encoding="utf-8", newline="") as file:
         return [
             Score(
-                **{field.name: kinds[str(field.type)](row[field.name]) for field in fields(Score)}
+                **{
+                    field.name: kinds[str(field.type)](row[field.name])
+                    for field in dataclasses.fields(Score)
+                }
             )
             for row in csv.DictReader(file)
         ]
@@ -105,25 +109,27 @@ def table(scores: Sequence[Score]) -> str:
     return "\n".join(lines)
 
 
-def over_all(scores: Sequence[Score]) -> dict[str, Estimate]:
-    """Return each policy's normalized performance over all environments it was run in."""
-    estimates = {}
+def overall_table(scores: Sequence[Score]) -> str:
+    """Return markdown: each policy's normalized performance over all environments it was run in."""
+    lines = ["| policy | normalized performance over all |", "|---|---:|"]
     for policy in dict.fromkeys(score.policy for score in scores):
         runs = [score for score in scores if score.policy == policy]
         strata = [
             np.array([score.normalized_performance for score in runs if score.env == env])
             for env in dict.fromkeys(score.env for score in runs)
         ]
-        estimates[policy] = interquartile_mean(*strata)
-    return estimates
+        lines.append(f"| {policy} | {_text(interquartile_mean(*strata), '{:.2f}')} |")
+    return "\n".join(lines)
 
 
 def _interval(values: Sequence[float], form: str) -> str:
-    estimate = interquartile_mean(np.array(values))
-    text = form.format(estimate.mean)
-    if np.isnan(estimate.low):
-        return text
-    return f"{text} [{form.format(estimate.low)}, {form.format(estimate.high)}]"
+    return _text(interquartile_mean(np.array(values)), form)
+
+
+def _text(estimate: Estimate, form: str) -> str:
+    # adding zero makes a 0 of -0
+    mean, low, high = (form.format(round(x, 2) + 0.0) for x in dataclasses.astuple(estimate))
+    return mean if np.isnan(estimate.low) else f"{mean} [{low}, {high}]"
 
 
 def _median(values: Sequence[float], form: Callable[[float], str]) -> str:
