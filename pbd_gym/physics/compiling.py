@@ -26,6 +26,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 from numba.core import cgutils, types
+from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
@@ -42,7 +43,9 @@ def kernel(function: Callable[..., Any], **options: Any) -> Any:
     raises ZeroDivisionError would stop the vectoriser. What would unpack the arguments from Python
     objects is left out: for a model's tables it took as long to compile as the function itself.
     """
-    dispatcher = _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+    dispatcher = _compiled(
+        function, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False, **options
+    )
     if not _SETTINGS.DISABLE_JIT:
         dispatcher.__class__ = _Inner
     return dispatcher
@@ -76,6 +79,18 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     finally:
         _SETTINGS.CACHE_DIR = before
 
+
+class _Apart(Compiler):
+    """Tells LLVM that what is written through one pointer is not read through another."""
+
+    def define_pipelines(self) -> Any:
+        self.state.flags.noalias = True
+        return super().define_pipelines()
+
+
+# For what is handed rows of different particles. It vectorises without first comparing where they
+# are, and without a second loop for the case that they overlap.
+apart = functools.partial(kernel, pipeline_class=_Apart)
 
 # For what is handed a whole model: in a call its tables would be copied, some hundred words.
 in_place = functools.partial(kernel, forceinline=True)
@@ -185,7 +200,8 @@ def cache_folder() -> Path | None:
     digest = hashlib.sha256()
     # what every package may call or be compiled for
     shared = [
-        Path(__file__).with_name(name) for name in ("parameters.py", "tables.py", "portable.py")
+        Path(__file__).with_name(name)
+        for name in ("compiling.py", "parameters.py", "tables.py", "portable.py")
     ]
     for source in (*sorted(_KERNELS.glob("*.py")), *shared):
         digest.update(source.read_bytes())

@@ -12,7 +12,7 @@ and the particles move by x_i -= w_i n_i s_i, x_(i+1) += w_(i+1) n_i s_i (Muelle
 
 import numpy as np
 
-from ..compiling import kernel, row
+from ..compiling import apart, kernel, row
 from .forces import note_chain
 from .layout import (
     COUPLING,
@@ -124,7 +124,7 @@ def _stiffened(compliance, entry, inverse_h2, iteration):
     return compliance.dtype.type(_FREE)
 
 
-@kernel
+@apart
 def _eliminate_current(before, a, b, mass_a, mass_b, rest, alpha):
     """Eliminate the link before this one; the direction is the current one."""
     real = type(a[0])
@@ -153,7 +153,7 @@ def _eliminate_current(before, a, b, mass_a, mass_b, rest, alpha):
         a[MULTIPLIER + lane] = error - factor * before[MULTIPLIER + lane]
 
 
-@kernel
+@apart
 def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
     """Eliminate the link before this one; the direction is that of the start of the substep.
 
@@ -187,7 +187,7 @@ def _eliminate_start(before, a, b, mass_a, mass_b, rest, alpha):
         a[MULTIPLIER + lane] = half * (square * inverse - rest) - factor * before[MULTIPLIER + lane]
 
 
-@kernel
+@apart
 def _eliminate_velocity(before, a, b, mass_a, mass_b, alpha):
     """Eliminate the link before this one; the unknowns are impulses along the links."""
     real = type(a[0])
@@ -234,7 +234,7 @@ def _back_substitute(work, masses, particles, first, last, quantity):
         after = link
 
 
-@kernel
+@apart
 def _apply(a, b, after, mass_a, mass_b, quantity):
     for lane in range(LANES):
         above = after[COUPLING + lane] * after[MULTIPLIER + lane]

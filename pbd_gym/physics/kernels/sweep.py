@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compiling import kernel, row
+from ..compiling import apart, kernel, row
 from .forces import BENDS, DISTANCES, force_row, note
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
@@ -32,7 +32,7 @@ def project_distances(work, masses, distances, inverse_h2, iteration, forces):
             )
 
 
-@kernel
+@apart
 def _distance(a, b, mass_a, mass_b, rest, alpha, stiffness, force):
     real = type(a[0])
     one, zero = real(1), real(0)
@@ -75,7 +75,7 @@ def project_distances_from_start(work, masses, distances, inverse_h2, iteration,
             )
 
 
-@kernel
+@apart
 def _distance_from_start(a, b, mass_a, mass_b, rest, alpha, stiffness, force):
     """One Newton step of (|x_a - x_b|^2 - rest^2) / (2 rest) = 0 along the start direction."""
     real = type(a[0])
@@ -120,7 +120,7 @@ def project_distance_velocities(work, masses, distances, h, forces):
             )
 
 
-@kernel
+@apart
 def _distance_velocity(a, b, mass_a, mass_b, h, force):
     real = type(a[0])
     one, zero = real(1), real(0)
@@ -161,7 +161,7 @@ def project_bends(work, masses, bends, inverse_h2, forces):
             _bend(a, b, c, mass_a, mass_b, mass_c, alpha, force)
 
 
-@kernel
+@apart
 def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, force):
     real = type(a[0])
     one, two, four, zero = real(1), real(2), real(4), real(0)
@@ -181,7 +181,7 @@ def _bend(a, b, c, mass_a, mass_b, mass_c, alpha, force):
         note(force, lane, np.sqrt(pull))
 
 
-@kernel
+@apart
 def _bend_with_friction(a, b, c, mass_a, mass_b, mass_c, alpha, held, force):
     real = type(a[0])
     one, two, four, zero = real(1), real(2), real(4), real(0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compiling import kernel, row
+from ..compiling import apart, kernel, row
 from .forces import CHAINS, force_row, note
 from .layout import DIM, LANES, POSITION, VELOCITY
 from .masses import in_lane, inverse_mass_of
@@ -22,24 +22,17 @@ def limit_strains(work, masses, chains, forces):
         # there and back, so that no thread is always the last
         chain = turn if turn < count else 2 * count - 1 - turn
         for entry in range(offsets[chain], offsets[chain + 1] - 1):
-            if greatest[entry] < np.inf:
-                i, j = particles[entry], particles[entry + 1]
-                _shorten(
-                    row(work, i),
-                    row(work, j),
-                    inverse_mass_of(masses, i),
-                    inverse_mass_of(masses, j),
-                    greatest[entry],
-                    force_row(forces, CHAINS, entry),
-                )
+            i, j = particles[entry], particles[entry + 1]
+            a, b, longest = row(work, i), row(work, j), greatest[entry]
+            if longest < np.inf and _is_longer(a, b, longest * longest):
+                w_a, w_b = inverse_mass_of(masses, i), inverse_mass_of(masses, j)
+                _shorten(a, b, w_a, w_b, longest, force_row(forces, CHAINS, entry))
 
 
-@kernel
+@apart
 def _shorten(a, b, mass_a, mass_b, greatest, force):
     real = type(a[0])
     one, zero = real(1), real(0)
-    if not _is_longer(a, b, greatest * greatest):
-        return
     for lane in range(LANES):
         w_a, w_b = in_lane(mass_a, a, lane), in_lane(mass_b, b, lane)
         total = w_a + w_b
@@ -57,7 +50,7 @@ def _shorten(a, b, mass_a, mass_b, greatest, force):
             b[POSITION + k * LANES + lane] += w_b * move
 
 
-@kernel
+@apart
 def _is_longer(a, b, greatest_square):
     """Tell whether a link is too long in any lane: a quick test, as most links are not."""
     zero, longer = type(greatest_square)(0), False
@@ -93,7 +86,7 @@ def damp_chains(work, masses, chains, h):
                 )
 
 
-@kernel
+@apart
 def _damp(a, b, mass_a, mass_b, share):
     zero = type(share)(0)
     for lane in range(LANES):
