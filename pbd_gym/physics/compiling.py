@@ -51,9 +51,9 @@ def kernel(function: Callable[..., Any], **options: Any) -> Any:
     return dispatcher
 
 
-def entry(function: Callable[..., Any]) -> Any:
+def entry(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a kernel that Python calls; it runs without the interpreter lock."""
-    return _compiled(function, nogil=True, no_cfunc_wrapper=True)
+    return _compiled(function, nogil=True, no_cfunc_wrapper=True, **options)
 
 
 class _Inner(CPUDispatcher):
@@ -92,6 +92,9 @@ class _Apart(Compiler):
 # are, and without a second loop for the case that they overlap.
 apart = functools.partial(kernel, pipeline_class=_Apart)
 
+# For what Python hands a whole model and what allocates nothing.
+borrowing = functools.partial(entry, _nrt=False)
+
 # For what is handed a whole model: in a call its tables would be copied, some hundred words.
 in_place = functools.partial(kernel, forceinline=True)
 
@@ -121,32 +124,6 @@ def _row(typing_context: Any, array: Any, index: Any) -> Any:
 # A bare pointer to a row of a two-dimensional array. A view would be counted as a reference, and
 # the atomic counting of three views per constraint takes longer than the arithmetic on 16 lanes.
 row: Any = operator.getitem if _SETTINGS.DISABLE_JIT else intrinsic(_row)
-
-
-def _borrowed(typing_context: Any, value: Any) -> Any:
-    """Type and generate `borrowed` (a numba intrinsic)."""
-
-    def without_owner(context: Any, builder: Any, kind: Any, part: Any) -> Any:
-        if isinstance(kind, types.Array):
-            view = context.make_array(kind)(context, builder, part)
-            for owner in ("meminfo", "parent"):
-                setattr(view, owner, cgutils.get_null_value(getattr(view, owner).type))
-            return view._getvalue()
-        for index, inner in enumerate(getattr(kind, "types", ())):  # of a tuple
-            item = without_owner(context, builder, inner, builder.extract_value(part, index))
-            part = builder.insert_value(part, item, index)
-        return part
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return without_owner(context, builder, signature.args[0], arguments[0])
-
-    return value(value), generate
-
-
-# The same nested tuple of arrays, owned by nobody: passing it on counts no references. Atomic
-# counting of forty arrays at every call took as long as the arithmetic of a short chain. Whoever
-# called the kernel holds the arrays meanwhile.
-borrowed: Any = (lambda value: value) if _SETTINGS.DISABLE_JIT else intrinsic(_borrowed)
 
 
 def load_kernels(dim: int, lanes: int) -> ModuleType:

@@ -13,6 +13,8 @@ def collide_with_walls(work, masses, room, forces):
     """Put every free particle of lanes not yet settled back into the room, with friction."""
     inverse_mass, lower_wall, upper_wall = masses.inverse_mass, room.lower, room.upper
     radius, friction, kinetic = room.radius, room.friction, room.kinetic_friction
+    if not _has_walls(lower_wall, upper_wall):
+        return
     marks = row(work, work.shape[0] - 2)
     for particle in range(inverse_mass.shape[0]):
         if inverse_mass[particle] > 0:
@@ -25,6 +27,14 @@ def collide_with_walls(work, masses, room, forces):
                     _stop_at_walls(
                         at, mass, marks, axis, lower, upper, friction, kinetic, force, normal
                     )
+
+
+@kernel
+def _has_walls(lower, upper):
+    found = False
+    for axis in range(DIM):
+        found = found or lower[axis] > -np.inf or upper[axis] < np.inf
+    return found
 
 
 @kernel

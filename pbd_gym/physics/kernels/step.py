@@ -1,6 +1,6 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
-from ..compiling import borrowed, entry, in_place, kernel, row
+from ..compiling import borrowing, in_place, kernel, row
 from .attachment import project_attachments
 from .chain import project_chain_velocities, project_chains, project_chains_from_start
 from .collider import collide_with_shapes
@@ -42,7 +42,7 @@ _CONTACT_SWEEPS = 32
 __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
 
-@entry
+@borrowing
 def advance(
     x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, model, timing, substeps
 ):
@@ -64,9 +64,6 @@ def advance(
         timing: The Timing.
         substeps: Number of substeps.
     """
-    x, v, targets, worlds, work = borrowed((x, v, targets, worlds, work))
-    found, listed, grabbed, forces = borrowed((found, listed, grabbed, forces))
-    model = borrowed(model)
     masses = model.particles
     for tile in range(tiles[0], tiles[1]):
         for attempt in range(2):
