@@ -8,10 +8,10 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench accuracy roofline baselines gallery clean
+.PHONY: help train test lint bench accuracy roofline scaling simd-report baselines gallery clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 # Called again without ARGS, training goes on where it was cut off; a finished run is only evaluated.
 RUN := runs/PBDRope-v0-ppo-0
@@ -37,6 +37,12 @@ accuracy: .venv/.installed-peers ## compare error and cost with other engines
 
 roofline: .venv/.installed-peers ## compare the kernels' speed with C
 	$(BIN)/python benchmarks/roofline.py $(ARGS)
+
+scaling: .venv/.installed-peers ## measure cost against particles, worlds and threads
+	$(BIN)/python benchmarks/scaling.py $(ARGS)
+
+simd-report: .venv/.installed-core ## tell which kernels are vector code
+	$(BIN)/python benchmarks/simd_report.py $(ARGS)
 
 baselines: .venv/.installed-train ## train and compare all policies over 5 seeds: hours, can be stopped and goes on
 	$(BIN)/python train/benchmark.py --readme README.md $(ARGS)

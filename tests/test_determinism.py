@@ -95,16 +95,6 @@ def test_a_thousand_worlds_on_one_thread_or_two_play_as_one_alone(id):
             assert earned == reward[world]
 
 
-def test_another_process_without_its_processors_features_plays_the_same_episodes(tmp_path):
-    # pytest's own process may have been told so; then this would compare nothing
-    assert "NUMBA_CPU_NAME" not in os.environ
-    result = run_digests(
-        XDG_CACHE_HOME=str(tmp_path), NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES=""
-    )
-    assert any(tmp_path.rglob("*.nbi")), "nothing was compiled for the other processor"
-    assert result == [digest(make(id)) for id in VARIANTS]
-
-
 def test_numpy_without_vector_instructions_plays_the_same_episodes():
     available = [name for name in NUMPY_FEATURES if numpy_dispatches(name)]
     result = run_digests(NPY_DISABLE_CPU_FEATURES=" ".join(available))

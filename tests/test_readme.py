@@ -100,6 +100,7 @@ def test_the_table_of_environments_is_of_today(id):
         ("README.md", "speed", "throughput.md"),
         ("docs/physics.md", "accuracy", "accuracy.md"),
         ("docs/performance.md", "roofline", "roofline.md"),
+        ("docs/performance.md", "scaling", "scaling.md"),
     ],
 )
 def test_tables_are_those_of_the_committed_results(page, mark, results):

@@ -19,8 +19,9 @@ from pbd_gym.physics.timestep import Adaptive, count_substeps, is_whole, timing_
 # One world runs in scalar code. Below this number of worlds a tile of lanes would be mostly empty.
 _FEWEST_FOR_LANES = 8
 _BATCH_LANES = 32
-# Below this many particles in all worlds, waking a second thread costs more than it brings.
-_FEWEST_PARTICLES_FOR_THREADS = 4096
+# Numbers in the model's tables, times worlds: a substep reads each once, so they tell its work.
+# Below this, waking a second thread costs more than it brings.
+_FEWEST_NUMBERS_FOR_THREADS = 2**18
 
 
 class World:
@@ -65,7 +66,7 @@ class World:
         self.lanes = lanes or (_BATCH_LANES if num_worlds >= _FEWEST_FOR_LANES else 1)
         tiles = -(-self.num_worlds // self.lanes)
         if num_threads is None:
-            worth_it = self.num_worlds * model.num_particles >= _FEWEST_PARTICLES_FOR_THREADS
+            worth_it = self.num_worlds * _size(model) >= _FEWEST_NUMBERS_FOR_THREADS
             num_threads = cores() if worth_it else 1
         self.num_threads = min(int(num_threads), tiles)
         shape = (self.num_worlds, model.num_particles, model.dim)
@@ -320,3 +321,9 @@ def _parameters(model: Model) -> Parameters:
         second_order=True if model.integrator == "rattle" else None,
         iterations=model.iterations,
     )
+
+
+def _size(model: Model) -> int:
+    """Return how many numbers stand in the tables of a model."""
+    tables = [table for table in _parameters(model) if isinstance(table, tuple)]
+    return sum(np.size(numbers) for table in tables for numbers in table)

@@ -127,8 +127,11 @@ def keep_forces(forces):
     """Put aside what a solve that may have failed has collected, and begin again."""
     if forces is None:
         return
-    forces[1][:] = forces[0]
-    forget_forces(forces)
+    for index in range(forces[0].shape[0]):
+        collected, kept = row(forces[0], index), row(forces[1], index)
+        for lane in range(LANES):
+            kept[lane] = collected[lane]
+            collected[lane] = 0
 
 
 @kernel
@@ -136,11 +139,11 @@ def take_up_kept_forces(forces, work):
     """Return to what was put aside in the lanes that have not failed."""
     if forces is None:
         return
-    collected, kept = forces[0], forces[1]
     marks = row(work, work.shape[0] - 2)
-    for lane in range(LANES):
-        if marks[FAILED + lane] == 0:
-            collected[:, lane] = kept[:, lane]
+    for index in range(forces[0].shape[0]):
+        collected, kept = row(forces[0], index), row(forces[1], index)
+        for lane in range(LANES):
+            collected[lane] = kept[lane] if marks[FAILED + lane] == 0 else collected[lane]
 
 
 @kernel

@@ -1,0 +1,40 @@
+"""What docs/performance.md says of machine code and cost can be measured anywhere."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+
+
+def run(script, *options):
+    """Run a benchmark in a process of its own; return what it prints."""
+    command = [sys.executable, BENCHMARKS / script, *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_hot_loops_over_the_lanes_are_vector_code():
+    lines = [line.split("|") for line in run("simd_report.py", "--scenes", "rope").splitlines()]
+    counts = {cells[1].strip(" `"): list(map(int, cells[2:6])) for cells in lines[4:] if cells[1:]}
+    hot = ("_eliminate_current", "_apply", "_bend", "_distance", "_predict", "_shorten")
+    for kernel in hot:
+        (found,) = (row for name, row in counts.items() if name.split(".")[1] == kernel)
+        bits, packed, scalar, calls = found
+        # 32 lanes are at least 4 vectors of 8: a scalar loop has as many scalar instructions
+        assert bits >= 128, (kernel, found)
+        assert packed >= 32, (kernel, found)
+        assert scalar < packed / 4, (kernel, found)
+        assert calls == 0, (kernel, found)
+
+
+def test_a_quick_run_of_scaling_writes_all_files(tmp_path):
+    printed = run("scaling.py", "--quick", "--out", tmp_path)
+    assert (tmp_path / "scaling.md").read_text(encoding="utf-8") in printed
+    assert (tmp_path / "scaling.png").stat().st_size > 0
+    with open(tmp_path / "scaling.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["series"] for row in rows} == {"particles", "worlds"}
+    assert all(0.0 < float(row["least"]) <= float(row["median"]) for row in rows)
