@@ -59,6 +59,11 @@ def rope(particles: int) -> Driven:
     return driven_rope(particles, substeps=max(20, particles // 8))
 
 
+def _batch(scene: Driven) -> int:
+    """Return how many worlds have about `_PARTICLES` particles, in whole tiles of 32 lanes."""
+    return max(1, _PARTICLES // scene.model.num_particles // 32) * 32
+
+
 def measure(
     series: str, cases: Sequence[tuple[Driven, int, int]], rounds: int, seconds: float
 ) -> list[Row]:
@@ -157,8 +162,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.quick:
         options.rounds, options.seconds = 2, 0.01
         ropes, cloths, worlds = ropes[:3], (), worlds[:4]
-    bodies = [(scene, max(32, _PARTICLES // scene.model.num_particles), 1)
-              for scene in (*map(rope, ropes), *map(driven_cloth, cloths))]  # fmt: skip
+    scenes = (*map(rope, ropes), *map(driven_cloth, cloths))
+    bodies = [(scene, _batch(scene), 1) for scene in scenes]
     batches = [rope(32)] if options.quick else [rope(32), driven_cloth(16)]
     rows = measure("particles", bodies, options.rounds, options.seconds)
     for scene in batches:
