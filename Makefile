@@ -8,7 +8,7 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench accuracy roofline scaling simd-report baselines gallery clean
+.PHONY: help train test lint bench accuracy roofline scaling simd-report baselines gallery rllib-smoke clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -50,8 +50,11 @@ baselines: .venv/.installed-train ## train and compare all policies over 5 seeds
 gallery: .venv/.installed-video ## draw the README's pictures and every environment in every look
 	$(BIN)/python docs/gallery.py $(ARGS)
 
+rllib-smoke: .venv-rllib/.installed ## train on a Ray cluster of two nodes and kill one of them
+	.venv-rllib/bin/python tests/rllib_smoke.py
+
 clean: ## remove .venv, caches and build files; results of training stay
-	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf .venv .venv-rllib build dist *.egg-info .pytest_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/.installed-core: EXTRAS :=
@@ -68,3 +71,11 @@ clean: ## remove .venv, caches and build files; results of training stay
 # pip is the last thing that venv writes, so a half-made .venv is not taken for a whole one.
 $(BIN)/pip:
 	$(PYTHON) -m venv .venv
+
+# Ray pins one Gymnasium, older than the one in constraints.txt.
+.venv-rllib/.installed: pyproject.toml constraints-rllib.txt | .venv-rllib/bin/pip
+	.venv-rllib/bin/python -m pip install --disable-pip-version-check -c constraints-rllib.txt -e ".[rllib]"
+	@touch $@
+
+.venv-rllib/bin/pip:
+	$(PYTHON) -m venv .venv-rllib

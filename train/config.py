@@ -38,10 +38,10 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         for name in ("total_timesteps", "num_envs", "eval_episodes", "threads"):
-            _check_at_least(name, getattr(self, name), 1)
+            check_at_least(name, getattr(self, name), 1)
         for name in ("seed", "eval_freq", "checkpoint_freq"):
-            _check_at_least(name, getattr(self, name), 0)
-        _check_registered(self.env)
+            check_at_least(name, getattr(self, name), 0)
+        check_registered(self.env)
         check_hyperparameters(self.algo, self.hyperparameters)
 
     @property
@@ -62,7 +62,7 @@ def new_config(given: dict[str, Any]) -> TrainingConfig:
     hyperparameters.update(given.pop("hyperparameters", {}))
     setup = {key: hyperparameters.pop(key) for key in SETUP if key in hyperparameters}
     total = given.pop("total_timesteps", setup["n_timesteps"])
-    _check_at_least("total_timesteps", total, 1)
+    check_at_least("total_timesteps", total, 1)
     return TrainingConfig(
         total_timesteps=total,
         num_envs=given.pop("num_envs", setup["n_envs"]),
@@ -101,12 +101,14 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-def _check_at_least(name: str, value: Any, lowest: int) -> None:
+def check_at_least(name: str, value: Any, lowest: int) -> None:
+    """Raise ValueError unless a setting is an integer of at least `lowest`."""
     if not isinstance(value, int) or value < lowest:
         raise ValueError(f"{name} must be an integer of at least {lowest}, got {value!r}")
 
 
-def _check_registered(env: str) -> None:
+def check_registered(env: str) -> None:
+    """Raise an error unless an environment exists and has a native batch."""
     module, _, name = env.rpartition(":")
     importlib.import_module(module or "pbd_gym")
     if gymnasium.spec(name).vector_entry_point is None:

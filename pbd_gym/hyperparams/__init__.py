@@ -50,9 +50,7 @@ def load_hyperparameters(algo: str, env_id: str) -> dict[str, Any]:
 
     check_algorithm(algo)
     entries = yaml.safe_load((Path(__file__).parent / f"{algo}.yml").read_text(encoding="utf-8"))
-    hyperparameters = dict(entries.get(env_id.split(":")[-1], entries["default"]))
-    check_hyperparameters(algo, hyperparameters)
-    return hyperparameters
+    return dict(entries.get(env_id.split(":")[-1], entries["default"]))
 
 
 def algorithm_class(algo: str) -> type[Any]:
@@ -76,7 +74,7 @@ def algorithm_arguments(algo: str, hyperparameters: dict[str, Any]) -> dict[str,
     arguments = {key: value for key, value in hyperparameters.items() if key not in SETUP}
     for key in ("learning_rate", "clip_range", "clip_range_vf"):
         if isinstance(arguments.get(key), str):
-            arguments[key] = LinearSchedule(_linear_start(key, arguments[key]), 0.0, 1.0)
+            arguments[key] = LinearSchedule(linear_start(key, arguments[key]), 0.0, 1.0)
     for key in ("policy_kwargs", "replay_buffer_kwargs"):
         if isinstance(arguments.get(key), str):
             arguments[key] = _read_dict(key, arguments[key])
@@ -103,7 +101,8 @@ def check_hyperparameters(algo: str, hyperparameters: dict[str, Any]) -> None:
         )
 
 
-def _linear_start(name: str, text: str) -> float:
+def linear_start(name: str, text: str) -> float:
+    """Return the number in "lin_0.001", the start of a fall to 0; `name` is for the ValueError."""
     kind, _, start = text.partition("_")
     try:
         value = float(start)
