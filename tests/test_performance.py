@@ -36,5 +36,5 @@ def test_a_quick_run_of_scaling_writes_all_files(tmp_path):
     assert (tmp_path / "scaling.png").stat().st_size > 0
     with open(tmp_path / "scaling.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert {row["series"] for row in rows} == {"particles", "worlds"}
+    assert {row["series"] for row in rows} == {"particles", "worlds", "threads"}
     assert all(0.0 < float(row["least"]) <= float(row["median"]) for row in rows)
