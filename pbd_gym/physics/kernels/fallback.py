@@ -12,7 +12,7 @@ ends beyond the speed limit is taken again with every substep held within it.
 import numpy as np
 
 from ..compiling import kernel, row
-from .layout import DIM, FAILED, KEPT, LANES, POSITION, START, TOO_FAST, VELOCITY
+from .layout import DIM, FAILED, KEPT, LANES, POSITION, SQUARES, START, TOO_FAST, VELOCITY
 from .masses import inverse_mass_of, is_grabbed
 
 # Error of a rigid length beyond which the solve has failed, as a share of it.
@@ -98,19 +98,15 @@ def take_up_kept(work, masses):
 
 
 @kernel
-def is_too_fast(work, masses, limit):
-    """Mark the lanes in which all speeds together exceed a limit; tell whether there are any."""
+def add_up_speeds(work, masses):
+    """Add up the squares of all speeds of each lane."""
     marks = row(work, work.shape[0] - 2)
     for lane in range(LANES):
-        marks[TOO_FAST + lane] = 0
+        marks[SQUARES + lane] = 0
     for particle in range(masses.inverse_mass.shape[0]):
         at = row(work, particle)
         for k in range(DIM):
             _add_squares(marks, at, VELOCITY + k * LANES, np.int64(LANES))
-    for lane in range(LANES):
-        # what is no number is too fast too
-        marks[TOO_FAST + lane] = 0 if marks[TOO_FAST + lane] <= limit * limit else 1
-    return _is_marked(marks, TOO_FAST)
 
 
 @kernel
@@ -118,7 +114,17 @@ def _add_squares(marks, at, quantity, lanes):
     # lanes: see `_read_off` in contact.py
     for lane in range(lanes):
         speed = at[quantity + lane]
-        marks[TOO_FAST + lane] += speed * speed
+        marks[SQUARES + lane] += speed * speed
+
+
+@kernel
+def is_too_fast(work, limit):
+    """Mark the lanes in which all speeds together exceed a limit; tell whether there are any."""
+    marks = row(work, work.shape[0] - 2)
+    for lane in range(LANES):
+        # what is no number is too fast too
+        marks[TOO_FAST + lane] = 0 if marks[SQUARES + lane] <= limit * limit else 1
+    return _is_marked(marks, TOO_FAST)
 
 
 @kernel

@@ -29,6 +29,7 @@ KEPT = MASS + LANES  # position that a failed solve must not touch
 FAILED = 0  # 1 where a second-order solve has failed
 TOO_FAST = LANES  # 1 where a control step has ended beyond the speed limit
 SETTLED = 2 * LANES  # 1 where contacts between bodies have been solved
+SQUARES = 3 * LANES  # sum of all speeds squared
 
 # In the row of sums, those of an area or volume:
 CONTENT = 0  # area or volume, then the multiplier

@@ -8,6 +8,7 @@ from .collision import collide_with_self, find_pairs, rub_against_self
 from .contact import collide_with_walls, read_velocities
 from .encounter import collide_with_others, part_from_others, unsettle
 from .fallback import (
+    add_up_speeds,
     has_failed,
     is_too_fast,
     limit_moves,
@@ -17,6 +18,7 @@ from .fallback import (
 )
 from .fold import project_folds, project_hinges
 from .forces import forget_forces, keep_forces, store_forces, take_up_kept_forces
+from .gain import take_out_gain
 from .layout import DIM, LANES, POSITION, START, VELOCITY, WIDTH
 from .limit import project_limits
 from .masses import inverse_mass_of, is_grabbed
@@ -93,12 +95,14 @@ def advance(
                 damp_chains(work, masses, model.chains, timing.h)
                 if attempt > 0:
                     limit_velocities(work, masses, timing.speed_limit)
-            if attempt == 0:
-                failed = is_too_fast(work, masses, timing.speed_limit)
-            else:
+            if attempt > 0:
                 # 0 times infinity is no number: pins too are put where they belong
                 aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
                 move_pins(x, targets, tile, worlds, work, masses, x.dtype.type(0))
+            add_up_speeds(work, masses)
+            if attempt == 0:
+                failed = is_too_fast(work, timing.speed_limit)
+            take_out_gain(x, v, tile, worlds, work, model, timing)
             store(x, v, tile, worlds, work, attempt)
             store_forces(forces, x, tile, worlds, work, timing.inverse_h2, attempt)
             if not failed:
