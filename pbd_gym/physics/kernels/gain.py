@@ -96,8 +96,8 @@ def _slow_down(lane, work, masses, gained, kinetic, per_mass):
         for particle in range(masses.inverse_mass.shape[0]):
             at, mass = row(work, particle), inverse_mass_of(masses, particle)
             if masses.inverse_mass[particle] > 0 and not is_grabbed(mass, at, lane):
-                own = at[VELOCITY + k * LANES + lane] - mean
-                at[VELOCITY + k * LANES + lane] = mean + share * own
+                own = work[particle, VELOCITY + k * LANES + lane] - mean
+                work[particle, VELOCITY + k * LANES + lane] = mean + share * own
 
 
 @kernel
