@@ -126,6 +126,28 @@ def test_a_pendulum_starts_at_the_angles_and_the_place_of_its_options():
     np.testing.assert_allclose(env.unwrapped.get_state().worlds.x[0], expected, atol=1e-6)
 
 
+def test_pendulums_begin_upright_in_the_asked_share_of_episodes():
+    env = make_vec("PBDDoublePendulum-v0", 1000, start_upright=0.3, start_angle=0.5, start_rate=1.5)
+    env.reset(seed=0)
+    state = env.unwrapped.get_state().worlds
+    link = np.diff(state.x, axis=1) / env.unwrapped.task.link_length
+    rate = np.diff(state.v, axis=1) / env.unwrapped.task.link_length
+    stands = link[:, 0, 1] > 0.0
+    assert abs(stands.mean() - 0.3) < 0.06  # four standard errors of 1000 episodes
+    height = np.where(stands[:, None], link[:, :, 1], -link[:, :, 1])
+    # 2000 links come within 1 % of the widest angle, and within float32 of the link's length
+    assert np.cos(0.5) - 1e-6 <= height.min() <= np.cos(0.495)
+    turning = link[:, :, 0] * rate[:, :, 1] - link[:, :, 1] * rate[:, :, 0]
+    assert 1.485 <= np.abs(turning).max() <= 1.5 + 1e-5
+
+
+def test_a_pendulum_that_stands_measures_its_angles_from_upright():
+    env = make("PBDDoublePendulum-v0", start_upright=0.5)
+    env.reset(options={"stand": 0.0, "angles": [0.5 * np.pi, 0.0], "rates": [0.0, 0.0]})
+    expected = [[0.0, 0.0], [-0.5, 0.0], [-0.5, 0.5]]
+    np.testing.assert_allclose(env.unwrapped.get_state().worlds.x[0], expected, atol=1e-6)
+
+
 def test_a_rope_starts_below_the_gripper_of_its_options():
     env = make("PBDRope-v0")
     env.reset(options={"gripper": [0.5, 0.25]})

@@ -49,8 +49,10 @@ class Pendulum(Task):
     at 5 rad/s), quiet = 1 - action^2.
 
     ## Starting State
-    The pivot rests in the middle, every link within 0.1 rad of hanging down, with rates within
-    0.1 rad/s.
+    The pivot rests in the middle, every link within `start_angle` (0.1 rad) of hanging down, with
+    rates within `start_rate` (0.1 rad/s). With the probability `start_upright` (0) the pendulum
+    stands on its head instead: episodes for training, as a learner that begins by hanging alone
+    hardly ever sees what balancing is worth.
 
     ## Episode End
     Truncated after 500 steps (10 s). Success: over the last 50 steps every cos theta_i > 0.99 (0.98
@@ -65,7 +67,8 @@ class Pendulum(Task):
 
     ```
     Every field of the class is a keyword. `reset` takes the options `angles` [rad from hanging
-    down, each link's own], `rates` [rad/s] and `pivot` [m].
+    down, each link's own], `rates` [rad/s] and `pivot` [m]; where `start_upright` is not 0, also
+    `stand`: below `start_upright` the pendulum begins turned upside down, angles and all.
 
     ## Version History
     * v0: first version
@@ -80,6 +83,9 @@ class Pendulum(Task):
     max_speed: float = number(3.0, 1e-3, 100.0, "m/s")
     max_acceleration: float = number(30.0, 1e-3, 1000.0, "m/s2")
     damping: float = number(0.0, 0.0, 100.0, "1/s")
+    start_angle: float = number(0.1, 0.0, _PI, "rad")
+    start_rate: float = number(0.1, 0.0, 10.0, "rad/s")
+    start_upright: float = number(0.0, 0.0, 1.0)
 
     hold_steps: ClassVar[int] = 50
     best_performance: ClassVar[float] = 1.0
@@ -118,20 +124,28 @@ class Pendulum(Task):
         return (self.workspace(),)
 
     def declare_draws(self) -> dict[str, Draw]:
-        """Draw small angles and rates; the pivot starts in the middle."""
-        small, whole = np.full(self.links, 0.1), np.full(self.links, _PI)
-        return {
-            "angles": draw(-small, small, -whole, whole),
-            "rates": draw(-small, small, -100.0 * small, 100.0 * small),
+        """Draw angles and rates about hanging at rest; the pivot starts in the middle."""
+        each = np.ones(self.links)
+        angle, rate = self.start_angle * each, self.start_rate * each
+        draws = {
+            "angles": draw(-angle, angle, -_PI * each, _PI * each),
+            "rates": draw(-rate, rate, -10.0 * each, 10.0 * each),
             "pivot": draw(0.0, 0.0, -self.rail, self.rail),
         }
+        if self.start_upright > 0.0:  # else one number less is drawn
+            draws["stand"] = draw(0.0, 1.0)
+        return draws
 
     def start(self, quantities: dict[str, np.ndarray]) -> Start:
-        """Place the links at their angles, turning at their rates."""
+        """Place the links at their angles, turning at their rates; upside down where they stand."""
         cosine, sine = cos_sin(quantities["angles"])
         link = self.link_length
         offset = link * np.stack([sine, -cosine], axis=2)
         motion = link * np.stack([cosine, sine], axis=2) * quantities["rates"][:, :, None]
+        if "stand" in quantities:
+            stands = quantities["stand"] < self.start_upright
+            sign = np.where(stands, -1.0, 1.0)[:, :, None]
+            offset, motion = sign * offset, sign * motion
         x = np.zeros((len(cosine), self.links + 1, 2))
         v = np.zeros_like(x)
         x[:, 1:] = np.cumsum(offset, axis=1)
