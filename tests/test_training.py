@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
 import evaluate
 import torch
 from callbacks import ProgressBar
+from checkpoint import load_checkpoint
 from config import load_config
 from files import write_atomically
 from intervals import bootstrap_mean, wilson_rate
@@ -32,6 +33,7 @@ import pbd_gym
 import train
 from pbd_gym.hyperparams import ALGORITHMS, algorithm_arguments, load_hyperparameters
 from pbd_gym.planning import SETTINGS
+from pbd_gym.sb3 import make_sb3_vec_env
 
 SCRIPT = Path(__file__).parents[1] / "train/train.py"
 ROPE = "pbd_gym:PBDRope-v0"
@@ -221,6 +223,21 @@ def test_a_training_from_hindsight_resumes_to_the_same_bits(tmp_path, monkeypatc
     assert train.main([*small_run(broken.parent, "sac"), *goal]) == 130
     assert train.main(["--resume", str(broken), "--no-video"]) == 0
     assert_same_run(straight, broken, SAC)
+
+
+def test_worlds_that_train_have_arguments_of_their_own_after_a_resumption_too(
+    tmp_path, monkeypatch
+):
+    straight, broken = (tmp_path / name / "PBDRope-v0-ppo-0" for name in ("a", "b"))
+    short = ["--train-env-kwargs", "max_episode_steps:10"]
+    assert train.main([*small_run(straight.parent), *short]) == 0
+    interrupt_after(monkeypatch, steps=130)
+    assert train.main([*small_run(broken.parent), *short]) == 130
+    assert train.main(["--resume", str(broken), "--no-video"]) == 0
+    assert_same_run(straight, broken, PPO)
+    # after 64 steps of each world
+    assert load_checkpoint(broken / "checkpoint.pkl")["worlds"]["lengths"].max() < 10
+    assert (np.load(broken / "evaluations.npz")["ep_lengths"] == 100).all()
 
 
 def test_n_steps_and_n_more_are_two_n_steps(tmp_path):
@@ -416,12 +433,17 @@ def test_the_hyperparameter_files_serve_every_environment(algo):
     path = Path(pbd_gym.__path__[0]) / "hyperparams" / f"{algo}.yml"
     entries = yaml.safe_load(path.read_text())
     registered = {name for name in gymnasium.registry if name.startswith("PBD")}
-    assert set(entries) - {"default"} <= registered
+    apart = entries.pop("train_env_kwargs", {})
+    assert set(entries) - {"default"} | set(apart) <= registered
+    # rl_zoo3 hands unknown entries to the algorithm, which refuses them
+    assert not any("train_env_kwargs" in entry for entry in entries.values())
     for name in registered:
         hyperparameters = load_hyperparameters(algo, f"pbd_gym:{name}")
         assert hyperparameters["n_timesteps"] > 0
         assert hyperparameters["n_envs"] > 0
         assert "policy" in algorithm_arguments(algo, hyperparameters)
+        assert hyperparameters.get("train_env_kwargs", {}) == apart.get(name, {})
+        make_sb3_vec_env(f"pbd_gym:{name}", 1, **apart.get(name, {})).close()
 
 
 def test_schedules_and_policies_given_as_text_are_read_as_rl_zoo3_reads_them():

@@ -34,6 +34,7 @@ class TrainingConfig:
     device: str = "cpu"
     threads: int = 1
     env_kwargs: dict[str, Any] = field(default_factory=dict)
+    train_env_kwargs: dict[str, Any] = field(default_factory=dict)  # over them, where it learns
     hyperparameters: dict[str, Any] = field(default_factory=dict)  # of the algorithm alone
 
     def __post_init__(self) -> None:
@@ -53,7 +54,8 @@ class TrainingConfig:
 def new_config(given: dict[str, Any]) -> TrainingConfig:
     """Complete what the user gave with the hyperparameter file and the defaults.
 
-    `hyperparameters` and `env_kwargs` given by the user win over the file, entry by entry.
+    `hyperparameters`, `env_kwargs` and `train_env_kwargs` given by the user win over the file,
+    entry by entry.
     """
     given = dict(given)
     hyperparameters = load_hyperparameters(
@@ -69,6 +71,7 @@ def new_config(given: dict[str, Any]) -> TrainingConfig:
         eval_freq=given.pop("eval_freq", -(-total // 20)),
         checkpoint_freq=given.pop("checkpoint_freq", -(-total // 10)),
         env_kwargs=setup.get("env_kwargs", {}) | given.pop("env_kwargs", {}),
+        train_env_kwargs=setup.get("train_env_kwargs", {}) | given.pop("train_env_kwargs", {}),
         hyperparameters=hyperparameters,
         **given,
     )

@@ -86,6 +86,13 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="KEY:VALUE",
         help="arguments of the environment, over those of the hyperparameter file",
     )
+    task.add_argument(
+        "--train-env-kwargs",
+        nargs="+",
+        action=StoreKeyValues,
+        metavar="KEY:VALUE",
+        help="the same for the worlds that train alone, not for those that evaluate or are filmed",
+    )
     task.add_argument("--algo", choices=ALGORITHMS, help="algorithm (default: ppo)")
     task.add_argument(
         "--hyperparameters",

@@ -52,7 +52,8 @@ class Training:
         self._evaluation_env.reset()
         self._checkpoint = checkpoint
         # Staggered, as rollouts of one and the same part of an episode teach PPO little.
-        env = make_sb3_vec_env(config.env, config.num_envs, stagger=True, **config.env_kwargs)
+        training_kwargs = config.env_kwargs | config.train_env_kwargs
+        env = make_sb3_vec_env(config.env, config.num_envs, stagger=True, **training_kwargs)
         if checkpoint is None:
             self.curve = LearningCurve()
             self.model: BaseAlgorithm = algorithm_class(config.algo)(

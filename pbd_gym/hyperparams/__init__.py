@@ -1,6 +1,8 @@
 """Hyperparameters of stable-baselines3 per algorithm and environment, in the format of rl_zoo3.
 
-One YAML file per algorithm maps environment ids to settings; `default` serves every other id.
+One YAML file per algorithm maps environment ids to settings; `default` serves every other id. What
+only the worlds that train are made with stands apart, under `train_env_kwargs`: rl_zoo3 would hand
+an entry that it does not know to the algorithm.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from typing import Any
 ALGORITHMS = ("ppo", "sac")
 
 # Entries that set up the training; all others are arguments of the algorithm.
-SETUP = frozenset({"n_timesteps", "n_envs", "env_kwargs"})
+SETUP = frozenset({"n_timesteps", "n_envs", "env_kwargs", "train_env_kwargs"})
 
 # Arguments of the algorithms that a settings file cannot give: the training sets them itself, or
 # they take objects. State-dependent exploration (sde) is refused as its noise is in no checkpoint.
@@ -44,13 +46,18 @@ def load_hyperparameters(algo: str, env_id: str) -> dict[str, Any]:
         env_id: Environment id, with or without its module: "pbd_gym:PBDRope-v0".
 
     Returns:
-        The settings under `env_id`, or those under `default` when it has none of its own.
+        The settings under `env_id`, or those under `default` when it has none of its own, with its
+        `train_env_kwargs` where there are some.
     """
     import yaml
 
     check_algorithm(algo)
     entries = yaml.safe_load((Path(__file__).parent / f"{algo}.yml").read_text(encoding="utf-8"))
-    return dict(entries.get(env_id.split(":")[-1], entries["default"]))
+    name = env_id.split(":")[-1]
+    hyperparameters = dict(entries.get(name, entries["default"]))
+    if name in entries.get("train_env_kwargs", {}):
+        hyperparameters["train_env_kwargs"] = entries["train_env_kwargs"][name]
+    return hyperparameters
 
 
 def algorithm_class(algo: str) -> type[Any]:
