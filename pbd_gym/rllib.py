@@ -45,6 +45,7 @@ _DEFAULTS: dict[str, Any] = {
     "n_timesteps": 1_000_000,
     "n_envs": 64,
     "env_kwargs": {},
+    "train_env_kwargs": {},
     "policy": "MlpPolicy",  # the networks follow from the spaces
     "n_steps": 64,
     "batch_size": 64,
@@ -92,7 +93,8 @@ def make_ppo_config(
         )
     batch_size = settings["n_envs"] * settings["n_steps"]
     # Ray gives each env runner one processor.
-    arguments = {"num_threads": 1, **settings["env_kwargs"], **(env_kwargs or {})}
+    arguments = {"num_threads": 1} | settings["env_kwargs"] | settings["train_env_kwargs"]
+    arguments |= env_kwargs or {}
     register_env("pbd_gym", make_rllib_vec_env)
     return (
         PPOConfig()
