@@ -5,7 +5,7 @@ With the nearest point p = (1 - t) x_a + t x_b, the constraint is C = |x_c - p| 
 gradients are n, -(1 - t) n and -t n, so that no collision changes the momentum of what collides.
 
 Contacts are solved in every substep, world by world, there and back through the list of those that
-can come about, until that moves nothing. Two balls on the ground show why: friction takes back how
+can come about in it, until that moves nothing. Two balls on the ground show why: friction takes back how
 the upper one slides, moving both by half; the ground takes back the lower one's half, and the upper
 one has slid by the other. Each sweep leaves half of that.
 """
@@ -30,7 +30,7 @@ _APART, _RESTS, _BOUNCES = 0, 1, 2
 
 @kernel
 def collide_with_others(work, masses, encounters, listed, timing, sweep, forces):
-    """Sweep over what is listed; return whether there is a lane to sweep again.
+    """Sweep over what is near; return whether there is a lane to sweep again.
 
     A lane is settled, and left alone, when nothing touches or when a sweep has moved nothing by
     more than a small share of what gravity moves in a substep: what is left of it in every substep
@@ -44,6 +44,7 @@ def collide_with_others(work, masses, encounters, listed, timing, sweep, forces)
     for lane in range(LANES):
         if sweep == 0:
             marks[SETTLED + lane] = 0
+            _list_near(work, encounters, listed, timing, lane)
         if marks[SETTLED + lane] == 0:
             touches, greatest = _sweep(
                 work, masses, encounters, listed, timing, sweep, lane, forces
@@ -66,6 +67,26 @@ def unsettle(work, encounters):
 
 
 @kernel
+def _list_near(work, encounters, listed, timing, lane):
+    """Of what can come about in the control step, list what can in this substep; none touches."""
+    indices, counts, contacts, scratch = listed
+    travel = scratch[0, lane] * timing.h / timing.dt
+    near = 0
+    for entry in range(counts[0, lane]):
+        index = indices[lane, entry, 0]
+        c, a, b = _rows(work, encounters, index)
+        reach = encounters.distance[index] + travel
+        if _square(c, a, b, POSITION, _nearest(c, a, b, lane), lane) < reach * reach:
+            indices[lane, near, 1] = entry
+            indices[lane, entry, 2] = _APART
+            contact = row(contacts, lane * indices.shape[1] + entry)
+            for k in range(RUB + DIM):
+                contact[k] = travel * 0
+            near += 1
+    counts[1, lane] = near
+
+
+@kernel
 def _sweep(work, masses, encounters, listed, timing, sweep, lane, forces):
     """Solve each contact of a lane; return whether there are any, and the greatest move [m].
 
@@ -76,26 +97,26 @@ def _sweep(work, masses, encounters, listed, timing, sweep, lane, forces):
     real = work.dtype.type
     zero, parting = real(0), real(_PARTING_SPEED) * timing.h
     touches, greatest = False, zero
-    for step in range(counts[lane]):
-        entry = step if sweep % 2 == 0 else counts[lane] - 1 - step
+    for step in range(counts[1, lane]):
+        entry = indices[lane, step if sweep % 2 == 0 else counts[1, lane] - 1 - step, 1]
         index = indices[lane, entry, 0]
         contact = row(contacts, lane * indices.shape[1] + entry)
-        if sweep == 0:
-            indices[lane, entry, 1] = _APART
-            for k in range(RUB + DIM):
-                contact[k] = zero
         c, a, b = _rows(work, encounters, index)
         t = _nearest(c, a, b, lane)
         distance = encounters.distance[index]
-        if contact[PUSH] == zero and _length(c, a, b, POSITION, t, lane) >= distance:
+        square = _square(c, a, b, POSITION, t, lane)
+        if contact[PUSH] == zero and square >= distance * distance:
             continue
         weights = _weights(masses, encounters, index, c, a, b, t, lane)
         if weights[3] > zero:
-            target = min(distance, _length(c, a, b, START, t, lane) + parting)
-            depth = target - _measure(c, a, b, t, lane)
-            if indices[lane, entry, 1] == _APART:
+            before = _square(c, a, b, START, t, lane)
+            target = distance
+            if before < distance * distance:
+                target = min(distance, np.sqrt(before) + parting)
+            depth = target - _measure(c, a, b, t, square, before, lane)
+            if indices[lane, entry, 2] == _APART:
                 touch, speed = _meet(c, a, b, lane, t, encounters, index, timing)
-                indices[lane, entry, 1], contact[SPEED] = touch, speed
+                indices[lane, entry, 2], contact[SPEED] = touch, speed
             friction = encounters.friction[index]
             told = _told(forces, encounters, index, t)
             move = _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told)
@@ -114,8 +135,9 @@ def part_from_others(work, masses, encounters, listed, h, forces):
         return
     indices, counts, contacts, _ = listed
     for lane in range(LANES):
-        for entry in range(counts[lane]):
-            touch = indices[lane, entry, 1]
+        for step in range(counts[1, lane]):
+            entry = indices[lane, step, 1]
+            touch = indices[lane, entry, 2]
             if touch == _APART:
                 continue
             index = indices[lane, entry, 0]
@@ -123,7 +145,8 @@ def part_from_others(work, masses, encounters, listed, h, forces):
             c, a, b = _rows(work, encounters, index)
             t = _nearest(c, a, b, lane)
             weights = _weights(masses, encounters, index, c, a, b, t, lane)
-            _measure(c, a, b, t, lane)
+            square, before = _square(c, a, b, POSITION, t, lane), _square(c, a, b, START, t, lane)
+            _measure(c, a, b, t, square, before, lane)
             parting = speed * 0
             for k in range(DIM):
                 parting += _normal(c, k, lane) * _apart(c, a, b, VELOCITY, t, k, lane)
@@ -176,35 +199,38 @@ def _apart(c, a, b, quantity, t, k, lane):
 
 
 @kernel
-def _length(c, a, b, quantity, t, lane):
+def _square(c, a, b, quantity, t, lane):
+    """Return the square of that vector's length."""
     square = t * 0
     for k in range(DIM):
         delta = _apart(c, a, b, quantity, t, k, lane)
         square += delta * delta
-    return np.sqrt(square)
+    return square
 
 
 @kernel
-def _measure(c, a, b, t, lane):
+def _measure(c, a, b, t, square, before, lane):
     """Return the distance of a particle from a link and write the normal into its row.
+
+    Given are the squares of the distances now and at the start of the substep.
 
     The distance is negative where the particle has passed the link within the substep. What lies on
     one spot is parted the way it came, or along the last axis.
     """
     real = type(c[0])
     one, zero = real(1), real(0)
-    now, before = _length(c, a, b, POSITION, t, lane), _length(c, a, b, START, t, lane)
-    aligned = zero
+    now, aligned = np.sqrt(square), zero
     for k in range(DIM):
         start = _apart(c, a, b, START, t, k, lane)
         aligned += start * _apart(c, a, b, POSITION, t, k, lane)
     side = -one if aligned < zero else one
+    inverse = side / now if now > zero else zero
     for k in range(DIM):
         normal = one if k == DIM - 1 else zero
         if now > zero:
-            normal = side * _apart(c, a, b, POSITION, t, k, lane) / now
+            normal = inverse * _apart(c, a, b, POSITION, t, k, lane)
         elif before > zero:
-            normal = _apart(c, a, b, START, t, k, lane) / before
+            normal = _apart(c, a, b, START, t, k, lane) / np.sqrt(before)
         c[NORMAL + k * LANES + lane] = normal
     return side * now
 
@@ -243,18 +269,20 @@ def _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told):
     23-24): held by the little that a later sweep adds to the push, it would let go there, and a
     stack would creep at g h sin(slope)/(2^sweeps - 1).
     """
-    push = max(contact[PUSH] + depth / weights[3], depth * 0)
-    way, square, moved = depth * 0, depth * 0, depth * 0
+    zero, one = depth * 0, depth * 0 + 1
+    inverse = one / weights[3]
+    push = max(contact[PUSH] + depth * inverse, zero)
+    way, square, moved = zero, zero, zero
     for k in range(DIM):
         way += _normal(c, k, lane) * _motion(c, a, b, t, k, lane)
     for k in range(DIM):
-        rub = _rub(c, a, b, lane, t, weights, way, contact, k)
+        rub = _rub(c, a, b, lane, t, inverse, way, contact, k)
         square += rub * rub
-    wanted, held = np.sqrt(square), friction * push
-    share = held / wanted if wanted > held else depth * 0 + 1
+    held = friction * push
+    share = held / np.sqrt(square) if square > held * held else one
     note_normal(told, lane, push - contact[PUSH])
     for k in range(DIM):
-        rub = share * _rub(c, a, b, lane, t, weights, way, contact, k)
+        rub = share * _rub(c, a, b, lane, t, inverse, way, contact, k)
         move = (push - contact[PUSH]) * _normal(c, k, lane) + rub - contact[RUB + k]
         contact[RUB + k] = rub
         _move(c, a, b, POSITION + k * LANES + lane, weights, move)
@@ -265,10 +293,10 @@ def _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told):
 
 
 @kernel
-def _rub(c, a, b, lane, t, weights, way, contact, k):
+def _rub(c, a, b, lane, t, inverse, way, contact, k):
     """Return the impulse of friction that takes back all sideways motion, along axis k [kg m]."""
     slide = _motion(c, a, b, t, k, lane) - way * _normal(c, k, lane)
-    return contact[RUB + k] - slide / weights[3]
+    return contact[RUB + k] - slide * inverse
 
 
 @kernel

@@ -13,8 +13,10 @@ _SPEED_UP = 2.0
 def list_encounters(work, encounters, listed, timing):
     """List, for every lane, the encounters that can come about within the control step.
 
-    listed: their indices and how they touch (LANES, capacity, 2), their number (LANES,), what a
-    contact pushes (LANES * capacity, 2 + DIM), and scratch (2, LANES). All have room in the lists.
+    listed: their indices, which of them are near in a substep and how they touch (LANES, capacity,
+    3), the numbers of what is listed and near (2, LANES), what a contact pushes (LANES * capacity,
+    2 + DIM), and scratch (2, LANES): by how much two things can approach. All have room in the
+    lists.
     """
     if encounters is None:
         return
@@ -22,15 +24,15 @@ def list_encounters(work, encounters, listed, timing):
     travel, beyond = row(scratch, 0), row(scratch, 1)
     _measure_travel(work, encounters.movers, travel, timing.dt, timing.gravity)
     for lane in range(LANES):
-        counts[lane] = 0
+        counts[0, lane] = 0
     for index in range(encounters.reach.shape[0]):
         c = row(work, encounters.particles[index])
         a, b = row(work, encounters.links[index, 0]), row(work, encounters.links[index, 1])
         if _can_meet(c, a, b, encounters.reach[index], travel, beyond):
             for lane in range(LANES):
                 if beyond[lane] < 0:
-                    indices[lane, counts[lane], 0] = index
-                    counts[lane] += 1
+                    indices[lane, counts[0, lane], 0] = index
+                    counts[0, lane] += 1
 
 
 @kernel
