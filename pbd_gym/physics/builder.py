@@ -35,6 +35,7 @@ class ModelBuilder(
         damping: float = 0.0,
         integrator: str = "pbd",
         iterations: int = 1,
+        contact_sweeps: int = 32,
         kinds: Collection[str] = (),
     ) -> Model:
         """Check everything that was added and return the Model.
@@ -45,6 +46,8 @@ class ModelBuilder(
             integrator: "pbd" or "rattle", see below.
             iterations: Projections of rigid constraints in a substep. A compliant constraint
                 receives its force in the first and keeps it.
+            contact_sweeps: Most sweeps over the contacts between bodies in a substep, which end
+                sooner where all are settled. With fewer, heaps are quicker and creep.
             kinds: Of "colliders", "encounters", "grabs" and "solids", those to compile for even if
                 the model has none. Kernels are compiled for the kinds that a model has; models that
                 are edited share one variant if all of them name the kinds that may come.
@@ -71,7 +74,9 @@ class ModelBuilder(
             gravity = np.zeros(self.dim)
             gravity[-1] = -9.81
         particles = self._particle_table(np.array(gravity, dtype=np.float64), "grabs" in kinds)
-        _check_settings(damping, integrator, iterations, kinds)
+        _check_settings(damping, integrator, kinds)
+        _check_count("iterations", iterations)
+        _check_count("contact_sweeps", contact_sweeps)
         chains, ropes = self._chain_tables()
         return Model(
             dim=self.dim,
@@ -90,22 +95,23 @@ class ModelBuilder(
             room=self._room_table(),
             colliders=self._collider_table("colliders" in kinds),
             self_collision=self._self_collision_table(),
-            encounters=self._encounter_table("encounters" in kinds),
+            encounters=self._encounter_table("encounters" in kinds, int(contact_sweeps)),
             bodies=tuple(self._bodies),
             **self._solid_tables("solids" in kinds),
         )
 
 
-def _check_settings(
-    damping: float, integrator: str, iterations: int, kinds: Collection[str]
-) -> None:
+def _check_settings(damping: float, integrator: str, kinds: Collection[str]) -> None:
     if not (np.isfinite(damping) and damping >= 0.0):
         raise ValueError(f"damping is {damping}; a rate must be finite and at least 0 [1/s]")
     if integrator not in INTEGRATORS:
         raise ValueError(f"integrator is {integrator!r}; allowed: {', '.join(INTEGRATORS)}")
-    whole = isinstance(iterations, int | np.integer) and not isinstance(iterations, bool)
-    if not whole or iterations < 1:
-        raise ValueError(f"iterations is {iterations!r}; expected a whole number from 1 up")
     for kind in kinds:
         if kind not in KINDS:
             raise ValueError(f"kind {kind!r} is unknown; allowed: {', '.join(KINDS)}")
+
+
+def _check_count(name: str, count: int) -> None:
+    whole = isinstance(count, int | np.integer) and not isinstance(count, bool)
+    if not whole or count < 1:
+        raise ValueError(f"{name} is {count!r}; expected a whole number from 1 up")

@@ -289,6 +289,7 @@ class Encounters(NamedTuple):
         reach: (M,) distance and half of the link's length as placed [m].
         friction: (M,) Coulomb coefficient.
         restitution: (M,) in [0, 1].
+        sweeps: Most sweeps over them in a substep.
     """
 
     movers: Any
@@ -298,6 +299,7 @@ class Encounters(NamedTuple):
     reach: Any
     friction: Any
     restitution: Any
+    sweeps: int
 
 
 def entries_of_links(table: Chains | Ropes) -> np.ndarray:

@@ -14,6 +14,7 @@ from pbd_gym.playground.drawing import RIGID, Drawing, Fabric
 # All drawings of one number of axes share one compiled variant, however they are edited.
 _KINDS = ("colliders", "encounters", "grabs", "solids")
 _ITERATIONS = 2  # a chain that is swung hard keeps its length with two
+_CONTACT_SWEEPS = 8  # a heap of 1000 balls is quick enough to play with, and creeps unseen
 _AREA_MODULUS = 2e3  # of soft bodies [N/m]
 _BULK_MODULUS = 2e4  # [Pa]
 _NET_RADIUS = 0.002  # of struts, drawn [m]
@@ -46,6 +47,7 @@ def build_model(drawing: Drawing, integrator: str) -> Model:
         damping=drawing.settings.damping,
         integrator=integrator,
         iterations=_ITERATIONS,
+        contact_sweeps=_CONTACT_SWEEPS,
         kinds=_KINDS,
     )
 

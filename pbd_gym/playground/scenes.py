@@ -159,7 +159,7 @@ def ball_pit(count: int = 200) -> Drawing:
         view=_PLANE,
         walls=True,
         particles=tuple(Particle(tuple(map(float, at)), 0.05) for at in places),
-        settings=Settings(restitution=0.4, friction=0.1),
+        settings=Settings(substeps=4, restitution=0.4, friction=0.1),
         balls=(Balls(tuple(range(count)), radius),),
         obstacles=(
             Obstacle("ball", (-0.5, -0.85), (0.18,)),

@@ -263,9 +263,10 @@ def test_an_integrator_is_one_that_exists(integrator):
     refused(line(), f"integrator is {integrator!r}; allowed: pbd, rattle", integrator=integrator)
 
 
-@pytest.mark.parametrize("iterations", [0, -1, 1.5, 2.0, True, "2", NAN])
-def test_iterations_are_a_whole_number(iterations):
-    refused(line(), f"iterations is {iterations!r}", iterations=iterations)
+@pytest.mark.parametrize("name", ["iterations", "contact_sweeps"])
+@pytest.mark.parametrize("count", [0, -1, 1.5, 2.0, True, "2", NAN])
+def test_iterations_and_sweeps_are_whole_numbers(name, count):
+    refused(line(), f"{name} is {count!r}", **{name: count})
 
 
 def test_a_shape_has_enough_particles():

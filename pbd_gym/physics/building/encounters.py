@@ -57,8 +57,8 @@ class EncounterBuilder(ParticleBuilder):
 
         What collides keeps its momentum. What moves relatively by more than 2 (r_a + r_b) within a
         substep can pass unseen. What overlaps is let apart at 1 m/s and keeps no speed of that.
-        Contacts are swept over up to 32 times a substep, or `iterations` times if that is more,
-        until they are settled: what stands by its friction stays. Particles do not turn.
+        Contacts are swept over until they are settled, up to `contact_sweeps` times a substep (see
+        `build`): what stands by its friction stays. Particles do not turn.
 
         Args:
             particles: Of the body, each once and in no other body.
@@ -74,7 +74,7 @@ class EncounterBuilder(ParticleBuilder):
         numbers = float(radius), bool(within), float(friction), float(restitution)
         self._groups.append(_Group(members, pairs, *numbers))
 
-    def _encounter_table(self, always: bool) -> Encounters | None:
+    def _encounter_table(self, always: bool, sweeps: int) -> Encounters | None:
         groups = self._groups
         if not groups and not always:
             return None
@@ -108,6 +108,7 @@ class EncounterBuilder(ParticleBuilder):
             reach=rows[:, 3] + length / 2.0,
             friction=rows[:, 4].copy(),
             restitution=rows[:, 5].copy(),
+            sweeps=sweeps,
         )
 
     def _check_that_links_do_not_cross(self) -> None:

@@ -38,8 +38,6 @@ from .volume import project_volumes
 
 # Iterations of the first-order solve that replaces a failed one.
 _AGAIN = 4
-# Most sweeps over the contacts between bodies in a substep.
-_CONTACT_SWEEPS = 32
 
 __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
@@ -180,7 +178,7 @@ def _collide_with_others(work, model, encounters, listed, timing, forces):
     if encounters is None:
         return
     masses = model.particles
-    for sweep in range(max(model.iterations, _CONTACT_SWEEPS)):
+    for sweep in range(encounters.sweeps):
         if sweep > 0:
             collide_with_shapes(work, masses, model.colliders, timing, forces)
             collide_with_walls(work, masses, model.room, forces)
