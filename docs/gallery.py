@@ -1,15 +1,18 @@
 """Draw the pictures and animations of the README, and every environment in every look.
 
     make gallery
-    python docs/gallery.py --model PBDRope-v0=runs/PBDRope-v0-ppo-0/best_model.zip
+    python docs/gallery.py --models models
 
-The README's are kept in docs/images; the looks of all environments go to build/gallery.
+The README's are kept in docs/images; the looks of all environments go to build/gallery. The folder
+holds policies that PPO of stable-baselines3 has saved, named after their environments, such as
+models/PBDRope-v0.zip; environments without one are filmed with their scripted policy.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +20,7 @@ import gymnasium
 import numpy as np
 
 import pbd_gym  # noqa: F401  (registers the environments)
+from pbd_gym.play import load_agent
 from pbd_gym.rendering import VideoWriter, Viewpoint, grid
 
 IMAGES = Path(__file__).parent / "images"
@@ -39,13 +43,14 @@ FILMS: tuple[tuple[str, str, int, int, int, dict[str, Any]], ...] = (
 )
 FILM_SIZE = 272
 
-Policy = Callable[[Any], np.ndarray]
+Models = dict[str, Path]
 
 
 def main() -> None:
     """Draw everything."""
     arguments = parse_arguments()
-    models = dict(pair.split("=", 1) for pair in arguments.model)
+    models = find_models(arguments.models)
+    print("trained policies: " + (", ".join(models) or "none"))
     IMAGES.mkdir(exist_ok=True)
     draw_tasks(models)
     for name, id, seed, steps, stride, look in FILMS:
@@ -61,53 +66,41 @@ def parse_arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--model",
-        action="append",
-        default=[],
-        metavar="ID=PATH",
-        help="model that PPO of stable-baselines3 saved, instead of the scripted policy; load only "
-        "your own, for it is unpickled (can be given once per environment)",
+        "--models",
+        type=Path,
+        metavar="FOLDER",
+        help="with trained policies, ID.zip each; only your own, for they are unpickled",
     )
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    if arguments.models is not None and not arguments.models.is_dir():
+        parser.error(f"argument --models: {arguments.models} is no folder")
+    return arguments
 
 
-def make_policy(id: str, env: Any, models: dict[str, str]) -> Policy:
-    """Return a function from an observation to an action."""
-    if id in models:
-        from stable_baselines3 import PPO
-
-        model = PPO.load(models[id], device="cpu")
-        return lambda observation: model.predict(observation, deterministic=True)[0]
-    scripted = env.get_wrapper_attr("task").scripted
-
-    def act(observation: Any) -> np.ndarray:
-        if isinstance(observation, dict):
-            return scripted({name: part[None] for name, part in observation.items()})[0]
-        return scripted(observation[None])[0]
-
-    return act
+def find_models(folder: Path | None) -> Models:
+    """Return the paths of the trained policies in a folder, by environment."""
+    if folder is None:
+        return {}
+    return {id: folder / f"{id}.zip" for id in IDS if (folder / f"{id}.zip").is_file()}
 
 
-def episode(
-    id: str, seed: int, steps: int, models: dict[str, str], **look: Any
-) -> Iterator[np.ndarray]:
-    """Yield the frame at the start of an episode and after each of its steps."""
-    env = gymnasium.make(id, render_mode="rgb_array", **look)
-    policy = make_policy(id, env, models)
+def episode(id: str, seed: int, steps: int, models: Models, **look: Any) -> Iterator[Any]:
+    """Yield an environment at the start of an episode and after each of its steps."""
+    policy, options = load_agent(str(models.get(id, "scripted")), "ppo", id)
+    env = gymnasium.make(id, render_mode="rgb_array", **look, **options)
     observation, _ = env.reset(seed=seed)
-    yield np.asarray(env.render())
+    yield env
     for _ in range(steps):
         observation, *_ = env.step(policy(observation))
-        yield np.asarray(env.render())
-    env.close()
+        yield env
 
 
-def draw_tasks(models: dict[str, str]) -> None:
+def draw_tasks(models: Models) -> None:
     """Draw tasks.png: a column per environment, time running down."""
     columns = []
     for id, seed, moments in TASKS:
-        frames = list(episode(id, seed, max(moments), models, render_size=(304, 304)))
-        columns.append([frames[moment] for moment in moments])
+        envs = enumerate(episode(id, seed, max(moments), models, render_size=(304, 304)))
+        columns.append([env.render() for moment, env in envs if moment in moments])
     tiles = [column[row] for row in range(len(columns[0])) for column in columns]
     save(IMAGES / "tasks.png", grid(tiles, len(columns)))
 
@@ -119,10 +112,11 @@ def draw_film(
     steps: int,
     stride: int,
     look: dict[str, Any],
-    models: dict[str, str],
+    models: Models,
 ) -> None:
     """Film one episode, and let its end stand for a second."""
-    frames = list(episode(id, seed, steps, models, render_size=(FILM_SIZE, FILM_SIZE), **look))
+    envs = episode(id, seed, steps, models, render_size=(FILM_SIZE, FILM_SIZE), **look)
+    frames = [env.render() for env in envs]
     rate = gymnasium.make(id).metadata["render_fps"] / stride
     with VideoWriter(path, rate) as video:
         for frame in [*frames[::stride], *[frames[-1]] * round(rate)]:
@@ -192,11 +186,11 @@ def draw_looks() -> None:
     LOOKS.mkdir(parents=True, exist_ok=True)
     for size in SIZES:
         for id in IDS:
-            tiles = [
-                list(episode(id, 3, 40, {}, render_size=(size, size), color=color, theme=theme))[-1]
-                for theme in THEMES
-                for color in COLORS
-            ]
+            tiles = []
+            for theme, color in product(THEMES, COLORS):
+                look = {"render_size": (size, size), "color": color, "theme": theme}
+                *_, env = episode(id, 3, 40, {}, **look)
+                tiles.append(env.render())
             save(LOOKS / f"{id}-{size}.png", grid(tiles, 2))
 
 

@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from pbd_gym.rendering import VideoWriter, grid
 
-Policy = Callable[[np.ndarray], np.ndarray]
+Policy = Callable[[Any], np.ndarray]
 
 
 def parse_arguments() -> argparse.Namespace:
@@ -91,16 +91,28 @@ def parse_grid(text: str) -> tuple[int, int]:
     return int(rows), int(columns)
 
 
-def load_policy(name: str, algo: str, env: Any) -> Policy:
-    """Return a function from observations (W, ...) to actions (W, ...)."""
-    if name == "random":
-        return lambda observation: env.action_space.sample()
-    if name == "scripted":
-        return env.unwrapped.task.scripted
-    import stable_baselines3
+def make_batch(arguments: argparse.Namespace, worlds: int) -> tuple[Any, Policy]:
+    """Return worlds that are drawn, and a function from observations (W, ...) to actions."""
+    policy, options = None, {}
+    if arguments.policy not in ("random", "scripted"):
+        from pbd_gym.sb3 import load_policy
 
-    model = getattr(stable_baselines3, algo.upper()).load(name, device="cpu")
-    return lambda observation: model.predict(observation, deterministic=True)[0]
+        policy, options = load_policy(arguments.policy, arguments.algo, arguments.env)
+    env: Any = gymnasium.make_vec(
+        arguments.env,
+        num_envs=worlds,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode=AutoresetMode.NEXT_STEP,  # the last frame shows how an episode ended
+        render_mode="rgb_array",
+        render_size=(arguments.size, arguments.size),
+        color=arguments.color,
+        theme=arguments.theme,
+        **options,
+    )
+    env.action_space.seed(arguments.seed)
+    if arguments.policy == "random":
+        return env, lambda observation: env.action_space.sample()
+    return env, policy or env.unwrapped.task.scripted
 
 
 def film_round(
@@ -130,18 +142,7 @@ def main() -> None:
     rows, columns = arguments.grid
     worlds = rows * columns
     rounds = -(-(arguments.episodes or worlds) // worlds)
-    env = gymnasium.make_vec(
-        arguments.env,
-        num_envs=worlds,
-        vectorization_mode="vector_entry_point",
-        autoreset_mode=AutoresetMode.NEXT_STEP,  # the last frame shows how an episode ended
-        render_mode="rgb_array",
-        render_size=(arguments.size, arguments.size),
-        color=arguments.color,
-        theme=arguments.theme,
-    )
-    env.action_space.seed(arguments.seed)
-    policy = load_policy(arguments.policy, arguments.algo, env)
+    env, policy = make_batch(arguments, worlds)
     steps = env.spec.max_episode_steps if env.spec else None
     successes = []
     with (

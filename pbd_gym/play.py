@@ -37,6 +37,7 @@ class Play:
         agent: Function from an observation to an action, that can take over; None for nobody.
         size: Side of the picture [pixels].
         seed: Of the first episode.
+        **options: Of the environment, as for `make`.
 
     Attributes:
         running: Until the user leaves.
@@ -47,7 +48,13 @@ class Play:
     """
 
     def __init__(
-        self, env_id: str, agent: Action | None = None, *, size: int = 640, seed: int = 0
+        self,
+        env_id: str,
+        agent: Action | None = None,
+        *,
+        size: int = 640,
+        seed: int = 0,
+        **options: Any,
     ) -> None:
         import pygame
 
@@ -57,7 +64,8 @@ class Play:
         pygame.display.set_caption(f"pbd_gym {env_id}")
         self._screen = pygame.display.set_mode((size + _COLUMN, size))
         self._clock = pygame.time.Clock()
-        self._env = gymnasium.make(env_id, render_mode="rgb_array", render_size=(size, size))
+        look: dict[str, Any] = {"render_mode": "rgb_array", "render_size": (size, size)}
+        self._env = gymnasium.make(env_id, **look, **options)
         self._task: Any = self._env.get_wrapper_attr("task")
         view, rails = self._task.view, self._task.rails
         self._seer = Renderer(self._task.model, view, size=(size, size), rails=rails)
@@ -240,24 +248,31 @@ class Play:
         return self._fonts[size]
 
 
-def load_agent(name: str, algo: str, env_id: str) -> Action:
-    """Return what acts: "scripted", the task's own policy, or a model of stable-baselines3.
+def load_agent(name: str, algo: str, env_id: str) -> tuple[Action, dict[str, Any]]:
+    """Return what acts, and the options of the environment in which it can.
+
+    Args:
+        name: "scripted", the task's own policy, or the path of a model of stable-baselines3.
+        algo: Of that model, "ppo" or "sac".
+        env_id: Of the environment.
 
     Raises:
         FileNotFoundError: If there is no such model.
         ImportError: If stable-baselines3 is not installed.
+        ValueError: If the model was trained on another task.
     """
-    if name == "scripted":
-        scripted = gymnasium.make(env_id).get_wrapper_attr("task").scripted
-        return lambda observation: scripted(observation[None])[0]
-    try:
-        import stable_baselines3
-    except ImportError as error:
-        raise ImportError('a policy needs stable-baselines3: pip install "pbd-gym[train]"') from (
-            error
-        )
-    model = getattr(stable_baselines3, algo.upper()).load(name, device="cpu")
-    return lambda observation: model.predict(observation, deterministic=True)[0]
+    if name != "scripted":
+        from pbd_gym.sb3 import load_policy
+
+        return load_policy(name, algo, env_id)
+    scripted = gymnasium.make(env_id).get_wrapper_attr("task").scripted
+
+    def act(observation: Any) -> np.ndarray:
+        if isinstance(observation, dict):
+            return scripted({name: part[None] for name, part in observation.items()})[0]
+        return scripted(observation[None])[0]
+
+    return act, {}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -287,10 +302,12 @@ def main(arguments: list[str] | None = None) -> int:
     if options.size % 2 or not 400 <= options.size <= 2000:
         parser.error(f"--size is {options.size}; allowed: even numbers from 400 to 2000")
     try:
-        agent = options.policy and load_agent(options.policy, options.algo, env_id)
+        agent, fitting = None, {}
+        if options.policy:
+            agent, fitting = load_agent(options.policy, options.algo, env_id)
     except (OSError, ImportError, ValueError) as error:
         parser.error(str(error))
-    Play(env_id, agent or None, size=options.size, seed=options.seed).run()
+    Play(env_id, agent, size=options.size, seed=options.seed, **fitting).run()
     return 0
 
 

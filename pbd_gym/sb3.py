@@ -12,9 +12,11 @@ list of empty dicts, and touches single worlds only where an episode has ended.
 
 from __future__ import annotations
 
+import os
 import time
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -57,6 +59,48 @@ def make_sb3_vec_env(
     if seed is not None:
         bridge.seed(seed)
     return bridge
+
+
+def load_policy(
+    path: str | os.PathLike[str], algo: str, id: str
+) -> tuple[Callable[[Any], np.ndarray], dict[str, Any]]:
+    """Load a saved model to act in an environment, without exploring.
+
+    Args:
+        path: Of the model; load only your own, for it is unpickled.
+        algo: "ppo" or "sac".
+        id: Of the environment.
+
+    Returns:
+        A function from an observation, or a batch of them, to actions; and the keywords of `make`
+        with which the environment observes what the model was trained on.
+
+    Raises:
+        FileNotFoundError: If there is no such model.
+        ValueError: If the model was trained on something else.
+    """
+    import stable_baselines3
+
+    model = getattr(stable_baselines3, algo.upper()).load(path, device="cpu")
+    seen = []
+    for kind in ("particles", "keypoints"):
+        env = gymnasium.make(id, observation=kind)
+        seen.append(_shapes(env.observation_space))
+        if _shapes(model.observation_space) == seen[-1] and model.action_space == env.action_space:
+            return partial(_act, model), {"observation": kind}
+    given, allowed = _shapes(model.observation_space), " or ".join(map(str, seen))
+    raise ValueError(f"{path} observes {given}; {id} has {allowed}: it was trained on another task")
+
+
+def _act(model: Any, observation: Any) -> np.ndarray:
+    return model.predict(observation, deterministic=True)[0]
+
+
+def _shapes(space: Any) -> Any:
+    """Return the shape of a space, of a dict those of its parts by name."""
+    if isinstance(space, gymnasium.spaces.Dict):
+        return {name: part.shape for name, part in space.items()}
+    return space.shape
 
 
 class SB3VecEnv(VecEnv):

@@ -42,10 +42,10 @@ class Hand:
         self.press(place, button)
         self.release(place, button)
 
-    def key(self, name):
+    def key(self, name, mod=0):
         code = self._pygame.key.key_code(name)
         for kind in (self._pygame.KEYDOWN, self._pygame.KEYUP):
-            event = self._pygame.event.Event(kind, key=code, mod=0, unicode="", scancode=0)
+            event = self._pygame.event.Event(kind, key=code, mod=mod, unicode="", scancode=0)
             self._pygame.event.post(event)
         self._settle()
 

@@ -55,6 +55,23 @@ def test_a_link_has_the_colour_of_its_own_strain():
     np.testing.assert_allclose(of_particles, [0.05, 0.05] + [0.0] * 10, atol=1e-12)
 
 
+def test_a_soft_body_shows_the_strain_of_its_area():
+    builder = ModelBuilder(2)
+    corners = 0.3 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    body = shapes.soft_body_2d(builder, corners, mass=0.1)
+    model = builder.build()
+    x = model.positions.copy()
+    strains = Strains(model, "light")
+    assert strains.of_content(np.array(body), x) == pytest.approx(0.0, abs=1e-12)  # rounding alone
+    assert strains.of_content(np.array(body), 1.1 * x) == pytest.approx(0.21, abs=1e-12)
+    assert strains.of_content(np.array(body[:3]), x) is None
+    renderer = Renderer(model, PLANE, size=SIZE, color="strain")
+    small, large = (as_ints(renderer.draw(share * x)) for share in (0.95, 1.05))
+    row, column = np.round(renderer.project(np.zeros((1, 2)))[0][0][::-1]).astype(int)
+    assert small[row, column, 2] - small[row, column, 0] > 20  # blue
+    assert large[row, column, 0] - large[row, column, 2] > 20  # red
+
+
 def test_a_cloth_shows_the_strain_of_its_threads():
     model = cloth()
     x = model.positions.copy()

@@ -1,12 +1,17 @@
+import runpy
 import subprocess
 import sys
 import time
+from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 from display import DRIVERS, choose_display, hand_on
 
 from pbd_gym.play import Play, load_agent, main
+
+EXAMPLE = Path(__file__).parents[1] / "examples/record_video.py"
 
 
 @pytest.fixture(params=DRIVERS)
@@ -15,8 +20,8 @@ def play(request, monkeypatch):
     pygame = pytest.importorskip("pygame")
     choose_display(request.param, monkeypatch)
 
-    def open_env(name, agent=None):
-        program = Play(name, agent, size=400)
+    def open_env(name, agent=None, **options):
+        program = Play(name, agent, size=400, **options)
         deadline = time.monotonic() + 300.0  # kernels may have to be compiled
         while not program.is_ready:
             program.frame()
@@ -78,8 +83,55 @@ def test_the_agent_takes_over_and_gives_back(play):
     assert len(asked) == count
 
 
+@pytest.fixture(scope="module")
+def models(tmp_path_factory):
+    """A function that saves an untrained model of an environment and returns its path."""
+    ppo = pytest.importorskip("stable_baselines3").PPO
+    folder = tmp_path_factory.mktemp("models")
+
+    def save(name, **options):
+        path = folder / f"{name}-{'-'.join(options.values())}.zip"
+        if not path.exists():
+            env = gymnasium.make(name, **options)
+            network = {"net_arch": [4]}
+            ppo("MlpPolicy", env, n_steps=8, batch_size=8, policy_kwargs=network, seed=0).save(path)
+        return str(path)
+
+    return save
+
+
+def test_a_saved_model_acts_on_the_observation_that_it_was_trained_on(models, play):
+    for kind in ("particles", "keypoints"):
+        path = models("PBDRope-v0", observation=kind)
+        agent, options = load_agent(path, "ppo", "PBDRope-v0")
+        assert options == {"observation": kind}
+    program, hand, _ = play("PBDRope-v0", agent, **options)
+    program.frame()
+    assert program.by_agent
+    assert program.steps == 1
+    hand.key("a")
+    assert not program.by_agent
+
+
+def test_a_model_of_another_task_is_refused(models, capsys):
+    with pytest.raises(SystemExit):
+        main(["PBDCloth-v0", "--policy", models("PBDRope-v0", observation="particles")])
+    assert "it was trained on another task" in capsys.readouterr().err
+
+
+def test_the_example_films_a_saved_model(models, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("imageio_ffmpeg")
+    path = models("PBDRope-v0", observation="keypoints")
+    film = tmp_path / "film.mp4"
+    options = ["--policy", path, "--grid", "1x2", "--size", "64", "--out", str(film)]
+    monkeypatch.setattr(sys, "argv", ["record_video.py", *options])
+    runpy.run_path(str(EXAMPLE), run_name="__main__")
+    assert "of 2 episodes succeeded" in capsys.readouterr().out
+    assert film.stat().st_size > 1_000
+
+
 def test_reward_and_its_terms_are_shown_and_the_episode_ends_and_begins_again(play):
-    program, _, pygame = play("PBDRope-v0", load_agent("scripted", "ppo", "PBDRope-v0"))
+    program, _, pygame = play("PBDRope-v0", load_agent("scripted", "ppo", "PBDRope-v0")[0])
     plain = pygame.surfarray.array3d(pygame.display.get_surface())
     for _ in range(100):
         program.frame()

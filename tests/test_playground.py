@@ -177,6 +177,30 @@ def test_the_integrators_are_compared_side_by_side(play):
     assert np.ptp(second) < 0.01
 
 
+def test_the_last_edit_is_undone_and_the_one_before(play):
+    pygame = pytest.importorskip("pygame")
+    app, hand = play(hanging_rope())
+    hand.key("z", pygame.KMOD_LCTRL)
+    assert "nothing to undo" in app.stage.message
+    drawn, sliders = app.stage.drawing, app.stage.drawing.settings
+    hand.click(seen(app, 5), button=3)
+    app.do("Pause")
+    before = position(app, slice(None))
+    hand.key("3")
+    (x, upper), (_, lower) = seen(app, 2), seen(app, 3)
+    hand.drag((x - 40, (upper + lower) // 2), (x + 40, (upper + lower) // 2))
+    assert len(app.stage.drawing.threads) == 2
+    app.stage.edit(replace(app.stage.drawing, settings=replace(sliders, gravity=1.0)))
+    app.stage.simulation.step()
+    hand.key("z", pygame.KMOD_LCTRL)
+    assert app.stage.drawing.threads == drawn.threads
+    assert app.stage.drawing.particles[5].pinned
+    assert app.stage.drawing.settings.gravity == 1.0
+    np.testing.assert_array_equal(position(app, slice(None)), before)
+    hand.key("z", pygame.KMOD_LCTRL)
+    assert app.stage.drawing.particles == drawn.particles
+
+
 def test_what_is_saved_is_loaded(play, tmp_path):
     app, hand = play(hanging_rope())
     hand.click(seen(app, 5), button=3)

@@ -44,6 +44,26 @@ def test_a_resized_window_keeps_the_picture_in_proportion(pygame):
         assert min(screen.get_at((450, 90))[:3]) > 200
 
 
+def test_a_window_that_is_resized_between_two_frames_draws_again_at_once(pygame, monkeypatch):
+    size, pauses = (512, 192), []
+
+    def resize(seconds):
+        if not pauses:
+            pygame.display.set_mode(size, pygame.RESIZABLE)
+            pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=512, h=192))
+        pauses.append(seconds)
+        sleep(seconds)
+
+    sleep = time.sleep
+    with Window(SIZE, 10) as window:
+        monkeypatch.setattr(time, "sleep", resize)
+        window.show(FRAME)
+        assert pauses
+        screen = pygame.display.get_surface()
+        assert screen.get_size() == size
+        assert screen.get_at((370, 90))[:3] == (200, 100, 50)
+
+
 @pytest.mark.parametrize("leave", ["close button", "escape", "pygame.quit"])
 def test_a_window_that_the_user_closes_stays_closed_and_raises_nothing(pygame, leave):
     window = Window(SIZE, 0)

@@ -124,9 +124,10 @@ class App:
             self.paused = True
             stage.simulation.step(self.pace)
         elif name == "Reset":
-            stage.simulation.reset()
+            stage.reset()
             self._place_controls()
-            stage.message = "As it was loaded."
+        elif name == "Undo":
+            stage.undo()
         elif name == "Spring":
             stage.springs = not stage.springs
         elif name == "Strain":
@@ -226,7 +227,7 @@ class App:
             self._take_control(event)
             self._take_mouse(event)
             if event.type == pygame.KEYDOWN:
-                self._take_key(event.key)
+                self._take_key(event)
 
     def _take_control(self, event: pygame.event.Event) -> None:
         """Do what a control was used for."""
@@ -266,11 +267,13 @@ class App:
         elif event.button == pygame.BUTTON_RIGHT:
             Pin().press(stage, event.pos)
 
-    def _take_key(self, key: int) -> None:
-        if key == pygame.K_ESCAPE:
+    def _take_key(self, event: pygame.event.Event) -> None:
+        if event.key == pygame.K_ESCAPE:
             self.running = False
-        elif key in KEYS:
-            self.do(KEYS[key])
+        elif event.key in KEYS:
+            self.do(KEYS[event.key])
+        elif event.key == pygame.K_z and event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META):
+            self.do("Undo")
 
     def _resize(self) -> None:
         """Fit everything into the window; a film has one size and ends."""

@@ -37,10 +37,10 @@ Left button: the tool chosen above. Right button: pin a particle, or free it.
 <b>space</b> pause, <b>.</b> single step, <b>s</b> slow motion, <b>r</b> reset
 <b>g</b> drag by a spring or by hand, <b>i</b> next integrator, <b>c</b> colours of strain
 <b>p</b> picture, <b>v</b> film, <b>F5</b> save, <b>F9</b> load
-<b>h</b> this help, <b>Esc</b> leave
+<b>ctrl z</b> undo the last cut, stroke or pin, <b>h</b> this help, <b>Esc</b> leave
 
 <b>Good to know</b>
-A closed line drawn makes a soft body, a click a ball. Reset undoes all edits. \
+A closed line drawn makes a soft body, a click a ball. Reset undoes all edits, too. \
 Pictures, films and scenes go to the folder in which the program was started."""
 
 

@@ -52,18 +52,23 @@ class Simulation:
 
     def __init__(self, scene: Scene) -> None:
         self._first = scene
+        self.grip: Grip | None = None
         self.revision = 0
         self.reset()
 
     def reset(self) -> None:
         """Return to the scene as it was given: whatever was edited since is undone."""
         self.drawing = self._first.drawing
-        self.grip: Grip | None = None
         self.time = 0.0
         self.revision += 1
         self.worlds = {name: self._world(self.drawing, name) for name in shown(self.drawing)}
+        self.place(self._first.x, self._first.v)
+
+    def place(self, x: np.ndarray, v: np.ndarray) -> None:
+        """Put all worlds into one state: positions [m] and velocities [m/s], (N, dim)."""
+        self.grip = None
         for world in self.worlds.values():
-            world.x, world.v = self._first.x, self._first.v
+            world.x, world.v = x, v
         self._forget_energies()
 
     def change(self, drawing: Drawing) -> None:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import replace
+
 import numpy as np
 
 from pbd_gym.playground.drawing import Drawing
+from pbd_gym.playground.files import Scene
 from pbd_gym.playground.simulation import Simulation
 from pbd_gym.playground.view import View
+
+_REMEMBERED = 100  # edits that can be undone
 
 
 class Stage:
@@ -24,6 +30,7 @@ class Stage:
         self.view = view
         self.message = ""
         self.springs = True
+        self._before: deque[Scene] = deque(maxlen=_REMEMBERED)
 
     @property
     def drawing(self) -> Drawing:
@@ -32,11 +39,32 @@ class Stage:
 
     def edit(self, drawing: Drawing, done: str = "") -> None:
         """Go on with another drawing, or say why that cannot be."""
+        before = self.simulation.scene()
         try:
             self.simulation.change(drawing)
-            self.message = done
         except ValueError as error:
             self.message = f"That cannot be: {error}"
+            return
+        if replace(drawing, settings=before.drawing.settings) != before.drawing:
+            self._before.append(before)
+        self.message = done
+
+    def undo(self) -> None:
+        """Go back to just before the last edit: all is where it was; the sliders stay."""
+        if not self._before:
+            self.message = "There is nothing to undo."
+            return
+        scene = self._before.pop()
+        drawing = replace(scene.drawing, settings=self.drawing.settings)
+        self.simulation.change(drawing)
+        self.simulation.place(scene.x, scene.v)
+        self.message = "The last edit is undone."
+
+    def reset(self) -> None:
+        """Go back to the scene as it was loaded."""
+        self.simulation.reset()
+        self._before.clear()
+        self.message = "As it was loaded."
 
     def nearest(self, pixel: tuple[float, float], reach: float = 28.0) -> int | None:
         """Return the particle that is seen nearest to a pixel, or None."""

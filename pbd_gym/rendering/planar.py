@@ -225,6 +225,10 @@ class PlanarPainter:
         ends = np.stack([closed[:-1], closed[1:]], axis=1)
         width = self._width(polygon.radius)
         self._canvas.strokes(ends, width + 1.6 * self._canvas.unit, colours * 0.55)
+        inside = self._strains.of_content(particles, self._x) if self._strains and solid else None
+        if self._strains is not None and inside is not None:
+            red, green, blue = self._strains.colours(np.array(inside))
+            fill = (round(red), round(green), round(blue))
         self._canvas.polygon(outline, paler(fill, self._theme))
         self._canvas.strokes(ends, width - 0.8 * self._canvas.unit, colours)
 
@@ -235,7 +239,12 @@ class PlanarPainter:
         for span in finite_spans(pixels[particles]):
             row = particles[span]
             colours = self._colours(row, len(row) - 1, self._theme.steel, solid=solid)
-            self._canvas.stroke(pixels[row], self._width(linkage.radius), colours)
+            width = self._width(linkage.radius)
+            if self._strains is None or not solid:
+                self._canvas.stroke(pixels[row], width, colours)
+            else:  # what is not strained is as pale as the paper: its edge shows it
+                ends = np.stack([pixels[row[:-1]], pixels[row[1:]]], axis=1)
+                paint_rods(self._canvas, ends, width, colours)
         radii = bob_radius(self._model, linkage)
         self._paint_bobs(particles[radii > 0.0], radii[radii > 0.0], pixels, fill)
 

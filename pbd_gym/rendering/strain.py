@@ -1,10 +1,16 @@
-"""Strain as a colour: how much longer or shorter each link is than it shall be."""
+"""Strain as a colour: how much longer or shorter each link is than it shall be, or larger an area.
+
+Bends, hinges, folds, rest shapes and the volumes of bodies in space have no colour.
+"""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 
 from pbd_gym.physics.model import Model
+from pbd_gym.physics.readouts import volume_strains
 from pbd_gym.rendering.canvas import Canvas
 from pbd_gym.rendering.palette import Theme
 
@@ -36,6 +42,7 @@ class Strains:
         self.pairs = np.concatenate([pairs, model.distances.pairs]).astype(np.int64)
         self._rest = np.concatenate([rest, model.distances.rest])
         self._positions = model.positions
+        self._model, self._contents = model, contents_of(model)
         stops = [list(bytes.fromhex(stop)) for stop in _SHORT_AND_LONG[theme]]
         self._colours = np.array(stops, dtype=np.float64)
         # All pairs as sorted numbers, to find the rest length of any.
@@ -62,6 +69,11 @@ class Strains:
             np.minimum.at(shortest, end, strain)
         return np.where(longest >= -shortest, longest, shortest)
 
+    def of_content(self, particles: np.ndarray, x: np.ndarray) -> float | None:
+        """Return the relative change of the area within particles (M,), None if it is not kept."""
+        index = self._contents.get(frozenset(particles.tolist()))
+        return None if index is None else float(volume_strains(self._model, x[None])[0, index])
+
     def of_grid(self, grid: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the strain of greatest size among the threads at particles (rows, columns)."""
         greatest = np.zeros(grid.shape)
@@ -86,6 +98,15 @@ class Strains:
 
     def _numbers(self, pairs: np.ndarray) -> np.ndarray:
         return pairs.min(axis=1) * self._count + pairs.max(axis=1)
+
+
+def contents_of(model: Model) -> dict[frozenset[int], int]:
+    """Return the index of each area or volume that a model keeps, by its particles."""
+    table = model.volumes
+    if table is None:
+        return {}
+    rows = pairwise(table.offsets.tolist())
+    return {frozenset(table.particles[a:b].tolist()): k for k, (a, b) in enumerate(rows)}
 
 
 def scale(strain: np.ndarray) -> np.ndarray:

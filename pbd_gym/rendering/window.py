@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,8 @@ from pbd_gym.rendering.video import check_frame
 
 if TYPE_CHECKING:
     import pygame
+
+_GLANCE = 0.01  # how often the window looks what the user does while it waits [s]
 
 
 class Window:
@@ -45,7 +48,7 @@ class Window:
         self._fps = fps
         self._title = title
         self._background = background
-        self._clock: pygame.time.Clock | None = None
+        self._due: float | None = None  # when the next picture is [s]; None before the first
 
     def __enter__(self) -> Window:
         return self
@@ -65,18 +68,27 @@ class Window:
         import pygame
 
         height, width = frame.shape[:2]
-        clock = self._clock
-        if clock is None:
+        if self._due is None:
             pygame.display.init()
             pygame.display.set_mode(self._size, pygame.RESIZABLE)
             pygame.display.set_caption(self._title)
-            clock = self._clock = pygame.time.Clock()
+            self._due = time.perf_counter()
         # Somebody else may have shut pygame down.
-        screen = pygame.display.get_surface() if pygame.display.get_init() else None
-        if screen is None or self._is_left():
+        if not pygame.display.get_init() or pygame.display.get_surface() is None:
             self.close()
             return
         picture = pygame.image.frombuffer(frame.tobytes(), (width, height), "RGB")
+        self._draw(picture)
+        self._due = max(self._due + 1.0 / self._fps, time.perf_counter()) if self._fps else 0.0
+        self._wait(picture)
+
+    def _draw(self, picture: pygame.Surface) -> None:
+        """Fit a picture into the window as large as it is now."""
+        import pygame
+
+        screen = pygame.display.get_surface()
+        assert screen is not None
+        width, height = picture.get_size()
         share = min(screen.get_width() / width, screen.get_height() / height)
         if share != 1.0:
             fitted = (max(round(width * share), 1), max(round(height * share), 1))
@@ -84,22 +96,29 @@ class Window:
         screen.fill(self._background)
         screen.blit(picture, picture.get_rect(center=screen.get_rect().center))
         pygame.display.flip()
-        clock.tick(self._fps)
+
+    def _wait(self, picture: pygame.Surface) -> None:
+        """Wait until the next picture is due; follow meanwhile what the user does."""
+        import pygame
+
+        while not self.closed:
+            for event in pygame.event.get():
+                if event.type == pygame.QUIT or (
+                    event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
+                ):
+                    self.close()
+                    return
+                if event.type == pygame.VIDEORESIZE:
+                    self._draw(picture)
+            left = (self._due or 0.0) - time.perf_counter()
+            if left <= 0.0:
+                return
+            time.sleep(min(left, _GLANCE))
 
     def close(self) -> None:
         """Close the window; doing so twice does no harm."""
-        if self._clock is not None and not self.closed:
+        if self._due is not None and not self.closed:
             import pygame
 
             pygame.display.quit()
         self.closed = True
-
-    def _is_left(self) -> bool:
-        """Whether the user wants to leave."""
-        import pygame
-
-        return any(
-            event.type == pygame.QUIT
-            or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE)
-            for event in pygame.event.get()
-        )

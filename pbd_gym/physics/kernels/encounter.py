@@ -5,9 +5,9 @@ With the nearest point p = (1 - t) x_a + t x_b, the constraint is C = |x_c - p| 
 gradients are n, -(1 - t) n and -t n, so that no collision changes the momentum of what collides.
 
 Contacts are solved in every substep, world by world, there and back through the list of those that
-can come about in it, until that moves nothing. Two balls on the ground show why: friction takes back how
-the upper one slides, moving both by half; the ground takes back the lower one's half, and the upper
-one has slid by the other. Each sweep leaves half of that.
+can come about in it, until that moves nothing. Two balls on the ground show why: friction takes
+back how the upper one slides, moving both by half; the ground takes back the lower one's half, and
+the upper one has slid by the other. Each sweep leaves half of that.
 """
 
 import numpy as np
