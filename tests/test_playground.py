@@ -249,6 +249,24 @@ def test_strain_is_shown_in_colours(play):
     assert differ.sum() > 500  # the rope and the legend
 
 
+def test_d_makes_the_window_dark_and_light_again(play):
+    pygame = pytest.importorskip("pygame")
+    app, hand = play(hanging_rope())
+
+    def brightness():
+        return float(pygame.surfarray.array3d(pygame.display.get_surface()).mean())
+
+    hand.key("3")
+    light = brightness()
+    hand.key("d")
+    assert brightness() < 80 < 200 < light
+    assert app.panel.buttons["Cut"].is_selected
+    press_button(app, hand, "Pause")
+    assert app.paused
+    hand.key("d")
+    assert brightness() == pytest.approx(light, abs=2)  # the rope has moved on, Pause is marked
+
+
 def test_a_window_of_any_size_has_room_for_all_controls(play):
     pygame = pytest.importorskip("pygame")
     app, _ = play(hanging_rope())

@@ -52,8 +52,6 @@ class App:
         pygame.font.init()
         pygame.display.set_caption("pbd_gym playground")
         self._screen = pygame.display.set_mode(size, pygame.RESIZABLE)
-        self._manager = pygame_gui.UIManager(size, theme.controls_theme())
-        self._manager.preload_fonts([{"name": "noto_sans", "point_size": 14, "style": "bold"}])
         self._clock = pygame.time.Clock()
         self._preparation = Preparation()
         self._recorder = Recorder(folder or Path.cwd(), FPS)
@@ -61,6 +59,8 @@ class App:
         self._pointer, self._is_pressed, self._pictures = (0, 0), False, 0
         self.running, self.paused, self.pace = True, False, _PACES[0]
         self.tool: Tool = TOOLS["Drag"]()
+        self._theme = "light"
+        self._manager = self._make_manager()
         self.open(scene)
 
     def open(self, scene: Scene) -> None:
@@ -113,6 +113,8 @@ class App:
             self.pace = _PACES[(_PACES.index(self.pace) + 1) % len(_PACES)]
         elif name == "Help":
             self._toggle_help()
+        elif name == "Dark":
+            self._toggle_dark()
         elif name == "Load":
             open_file_dialog(self._manager, self._layout, self._recorder.folder)
         elif stage is not None:
@@ -148,9 +150,10 @@ class App:
             stage.message = recorder.finish_film() or recorder.start_film(self._screen)
 
     def _draw(self) -> None:
-        self._screen.fill(theme.SIDE)
+        shades = theme.SHADES[self._theme]
+        self._screen.fill(shades.side)
         if self.stage is None:
-            draw_waiting(self._screen, self._layout, self._pictures, self.message)
+            draw_waiting(self._screen, self._layout, self._pictures, self.message, shades)
         else:
             draw_stage(self._screen, self._layout, self.stage, self.tool, self._pointer)
         self.panel.status.set_text(self._status())
@@ -181,7 +184,7 @@ class App:
             self._manager, self._layout, list(SCENES), drawing.name, drawing.settings
         )
         if self.stage is not None:
-            self.stage.view = View(self._layout.view, strains=self.stage.view.strains)
+            self.stage.view = self._make_view(strains=self.stage.view.strains)
         self._has_slid, self._numbers = False, ""
         self._mark_buttons()
 
@@ -203,7 +206,7 @@ class App:
         try:
             if not self._preparation.is_ready(self._scene.drawing):
                 return
-            self.stage = Stage(Simulation(self._scene), View(self._layout.view))
+            self.stage = Stage(Simulation(self._scene), self._make_view())
             self._mark_buttons()
         except (ValueError, RuntimeError) as error:
             self.message = f"This scene cannot be shown: {error}"
@@ -285,6 +288,21 @@ class App:
         self._place_controls()
         if words is not None:
             self.say(words)
+
+    def _make_manager(self) -> pygame_gui.UIManager:
+        """Return who draws the controls."""
+        colours = theme.controls_theme(theme.SHADES[self._theme])
+        manager = pygame_gui.UIManager(self._screen.get_size(), colours)
+        manager.preload_fonts([{"name": "noto_sans", "point_size": 14, "style": "bold"}])
+        return manager
+
+    def _make_view(self, *, strains: bool = False) -> View:
+        return View(self._layout.view, strains=strains, theme=self._theme)
+
+    def _toggle_dark(self) -> None:
+        self._theme = "light" if self._theme == "dark" else "dark"
+        self._manager = self._make_manager()
+        self._place_controls()
 
     def _toggle_help(self) -> None:
         if self._help is not None and self._help.alive():

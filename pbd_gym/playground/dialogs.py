@@ -23,6 +23,7 @@ KEYS = {
     pygame.K_i: "Integrator",
     pygame.K_g: "Spring",
     pygame.K_c: "Strain",
+    pygame.K_d: "Dark",
     pygame.K_p: "Picture",
     pygame.K_v: "Film",
     pygame.K_F5: "Save",
@@ -35,7 +36,8 @@ Left button: the tool chosen above. Right button: pin a particle, or free it.
 <b>Keys</b>
 <b>1 2 3 4</b> drag, pin, cut, draw
 <b>space</b> pause, <b>.</b> single step, <b>s</b> slow motion, <b>r</b> reset
-<b>g</b> drag by a spring or by hand, <b>i</b> next integrator, <b>c</b> colours of strain
+<b>g</b> drag by a spring or by hand, <b>i</b> next integrator
+<b>c</b> colours of strain, <b>d</b> dark or light
 <b>p</b> picture, <b>v</b> film, <b>F5</b> save, <b>F9</b> load
 <b>ctrl z</b> undo the last cut, stroke or pin, <b>h</b> this help, <b>Esc</b> leave
 

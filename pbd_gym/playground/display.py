@@ -22,7 +22,8 @@ def draw_stage(
         screen.set_clip(layout.view)
         tool.draw(screen, stage, pointer)
         screen.set_clip(None)
-    draw_energies(screen, layout.curve, stage.simulation.energies, REMEMBERED)
+    energies, shades = stage.simulation.energies, stage.view.shades
+    draw_energies(screen, layout.curve, energies, REMEMBERED, shades)
 
 
 def count_up(drawing: Drawing, fps: float, pace: float) -> str:
@@ -37,13 +38,15 @@ def count_up(drawing: Drawing, fps: float, pace: float) -> str:
     return f"{count} particles  ·  {fps:.0f} pictures/s  ·  {fps * pace:.2g} × real time  ·  "
 
 
-def draw_waiting(screen: pygame.Surface, layout: Layout, pictures: int, message: str) -> None:
+def draw_waiting(
+    screen: pygame.Surface, layout: Layout, pictures: int, message: str, shades: theme.Shades
+) -> None:
     """Say that the physics are being prepared, or what went wrong."""
     place = layout.view.union(layout.curve)
-    screen.fill(theme.PAPER, place)
+    screen.fill(shades.paper, place)
     if message:
         return
     words = "Preparing the physics, once"
     width, height = theme.font(20).size(words)
     corner = (place.centerx - width / 2, place.centery - height / 2)
-    theme.write(screen, words + "." * (pictures // 20 % 4), corner, theme.FAINT, 20)
+    theme.write(screen, words + "." * (pictures // 20 % 4), corner, shades.faint, 20)

@@ -11,10 +11,7 @@ import pygame
 from pbd_gym.playground import theme
 from pbd_gym.rendering.palette import Colour
 
-STYLES: dict[str, tuple[str, Colour]] = {
-    "pbd": ("first order (the seed's)", theme.FIRST_ORDER),
-    "rattle": ("second order (RATTLE)", theme.SECOND_ORDER),
-}
+_WORDS = {"pbd": "first order (the seed's)", "rattle": "second order (RATTLE)"}
 _LEFT, _TOP, _BOTTOM, _RIGHT = 62, 36, 14, 16  # margins [pixels]
 
 
@@ -23,6 +20,7 @@ def draw_energies(
     place: pygame.Rect,
     energies: Mapping[str, Sequence[float]],
     pictures: int,
+    shades: theme.Shades,
 ) -> None:
     """Draw the curves.
 
@@ -31,13 +29,14 @@ def draw_energies(
         place: Where on it.
         energies: By integrator, the latest values [J].
         pictures: How many values the width shows.
+        shades: Colours of the window.
     """
-    pygame.draw.rect(surface, theme.PAPER, place)
-    pygame.draw.line(surface, theme.LINE, place.topleft, place.topright)
-    theme.write(surface, "Energy [J]", (place.left + 12, place.top + 6), theme.FAINT, 13)
+    pygame.draw.rect(surface, shades.paper, place)
+    pygame.draw.line(surface, shades.line, place.topleft, place.topright)
+    theme.write(surface, "Energy [J]", (place.left + 12, place.top + 6), shades.faint, 13)
     at = place.left + 110
     for name in energies:
-        words, colour = STYLES[name]
+        words, colour = style(name, shades)
         pygame.draw.line(surface, colour, (at, place.top + 16), (at + 18, place.top + 16), 3)
         theme.write(surface, words, (at + 24, place.top + 6), colour, 13)
         at += 44 + theme.font(13).size(words)[0]
@@ -50,16 +49,24 @@ def draw_energies(
     low, high, step = _scale(list(chain.from_iterable(energies.values())))
     for value in np.arange(low, high + 0.5 * step, step):
         y = area.bottom - (value - low) / (high - low) * area.height
-        pygame.draw.line(surface, theme.LINE, (area.left, y), (area.right, y))
+        pygame.draw.line(surface, shades.line, (area.left, y), (area.right, y))
         words = f"{value:.6g}"
         width, height = theme.font(12).size(words)
         corner = (area.left - 8 - width, y - height / 2)
-        theme.write(surface, words, corner, theme.FAINT, 12)
+        theme.write(surface, words, corner, shades.faint, 12)
     for name, values in energies.items():
         if len(values) > 1:
             x = area.left + np.arange(len(values)) * (area.width / (pictures - 1))
             y = area.bottom - (np.array(values) - low) / (high - low) * area.height
-            pygame.draw.lines(surface, STYLES[name][1], False, np.stack([x, y], 1).tolist(), 2)
+            pygame.draw.lines(
+                surface, style(name, shades)[1], False, np.stack([x, y], 1).tolist(), 2
+            )
+
+
+def style(integrator: str, shades: theme.Shades) -> tuple[str, Colour]:
+    """Return what an integrator is called, and the colour of its curve."""
+    colour = shades.first_order if integrator == "pbd" else shades.second_order
+    return _WORDS[integrator], colour
 
 
 def _scale(values: Sequence[float]) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 import pygame
 
-from pbd_gym.playground import editing, theme
+from pbd_gym.playground import editing
 from pbd_gym.playground.simulation import Grip
 from pbd_gym.playground.stage import Stage
 
@@ -68,9 +68,9 @@ class Drag:
             return
         place = stage.place_of(particle, pixel)
         if grip is not None:
-            pygame.draw.aaline(surface, theme.MARK, place, pixel)
-            pygame.draw.aacircle(surface, theme.MARK, pixel, 4)
-        pygame.draw.aacircle(surface, theme.MARK, place, 10, 2)
+            pygame.draw.aaline(surface, stage.view.shades.mark, place, pixel)
+            pygame.draw.aacircle(surface, stage.view.shades.mark, pixel, 4)
+        pygame.draw.aacircle(surface, stage.view.shades.mark, place, 10, 2)
 
 
 class Pin:
@@ -97,7 +97,9 @@ class Pin:
         """Mark what would be pinned."""
         particle = stage.nearest(pixel)
         if particle is not None:
-            pygame.draw.aacircle(surface, theme.MARK, stage.place_of(particle, pixel), 10, 2)
+            pygame.draw.aacircle(
+                surface, stage.view.shades.mark, stage.place_of(particle, pixel), 10, 2
+            )
 
 
 class Cut:
@@ -134,7 +136,7 @@ class Cut:
     def draw(self, surface: pygame.Surface, stage: Stage, pixel: Pixel) -> None:
         """Show the last part of the stroke."""
         if len(self._trail) > 1:
-            pygame.draw.lines(surface, theme.MARK, False, self._trail, 2)
+            pygame.draw.lines(surface, stage.view.shades.mark, False, self._trail, 2)
 
 
 class Draw:
@@ -181,10 +183,12 @@ class Draw:
     def draw(self, surface: pygame.Surface, stage: Stage, pixel: Pixel) -> None:
         """Show the stroke, and the particle that it would join."""
         if len(self._stroke) > 1:
-            pygame.draw.lines(surface, theme.MARK, False, self._stroke, 2)
+            pygame.draw.lines(surface, stage.view.shades.mark, False, self._stroke, 2)
         particle = stage.nearest(pixel, _SNAP) if stage.drawing.dim == 2 else None
         if particle is not None:
-            pygame.draw.aacircle(surface, theme.MARK, stage.place_of(particle, pixel), 8, 2)
+            pygame.draw.aacircle(
+                surface, stage.view.shades.mark, stage.place_of(particle, pixel), 8, 2
+            )
 
     def _add_ball(self, stage: Stage, pixel: np.ndarray) -> None:
         point = _points(stage, pixel[None])[0]

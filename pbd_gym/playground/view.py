@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pygame
 
-from pbd_gym.playground import theme
 from pbd_gym.playground.drawing import Drawing
-from pbd_gym.playground.energy import STYLES
+from pbd_gym.playground.energy import style
 from pbd_gym.playground.simulation import Simulation
+from pbd_gym.playground.theme import SHADES, Shades, write
 from pbd_gym.rendering import Renderer
 
 _GAP = 2  # between two pictures side by side [pixels]
@@ -23,29 +23,36 @@ class View:
     Attributes:
         place: As given.
         strains: Whether links are coloured by how much they are stretched or pressed.
+        theme: "light" or "dark".
     """
 
-    def __init__(self, place: pygame.Rect, *, strains: bool = False) -> None:
+    def __init__(self, place: pygame.Rect, *, strains: bool = False, theme: str = "light") -> None:
         self.place = place
         self.strains = strains
+        self.theme = theme
         self._renderers: dict[str, Renderer] = {}
         self._pictures: dict[str, pygame.Rect] = {}
         self._shown: tuple[object, ...] = ()
 
+    @property
+    def shades(self) -> Shades:
+        """The colours of the window."""
+        return SHADES[self.theme]
+
     def show(self, surface: pygame.Surface, simulation: Simulation) -> None:
         """Draw all worlds of a simulation on the window."""
         self._fit(simulation)
-        surface.fill(theme.PAPER, self.place)
+        surface.fill(self.shades.paper, self.place)
         for name, renderer in self._renderers.items():
             place = self._pictures[name]
             renderer.draw_on(surface.subsurface(place), simulation.worlds[name].x[0])
             if simulation.is_compared:
-                words, colour = STYLES[name]
-                theme.write(surface, words, (place.left + 14, place.top + 10), colour, 15)
+                words, colour = style(name, self.shades)
+                write(surface, words, (place.left + 14, place.top + 10), colour, 15)
         if simulation.is_compared:
             middle = self.place.centerx
             ends = ((middle, self.place.top), (middle, self.place.bottom))
-            pygame.draw.line(surface, theme.LINE, *ends, _GAP)
+            pygame.draw.line(surface, self.shades.line, *ends, _GAP)
 
     def pixels(self, simulation: Simulation, near: tuple[float, float]) -> np.ndarray:
         """Return where particles are seen in the picture under a pixel, (N, 2) of the window."""
@@ -96,7 +103,9 @@ class View:
             self._pictures[name] = pygame.Rect(left, self.place.top, width, height)
             view = _with_ground(simulation.drawing)
             color = "strain" if self.strains else "material"
-            self._renderers[name] = Renderer(world.model, view, size=(width, height), color=color)
+            self._renderers[name] = Renderer(
+                world.model, view, size=(width, height), color=color, theme=self.theme
+            )
 
 
 def _with_ground(drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
