@@ -25,8 +25,9 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
-from numba.core import cgutils, types
+from numba.core import cgutils, ir, types
 from numba.core.compiler import Compiler
+from numba.core.ir_utils import alias_analysis_extensions
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
@@ -124,6 +125,22 @@ def _row(typing_context: Any, array: Any, index: Any) -> Any:
 # A bare pointer to a row of a two-dimensional array. A view would be counted as a reference, and
 # the atomic counting of three views per constraint takes longer than the arithmetic on 16 lanes.
 row: Any = operator.getitem if _SETTINGS.DISABLE_JIT else intrinsic(_row)
+
+
+def _keep_writes(
+    assignment: Any, arguments: Any, typemap: Any, function: Any, aliases: Any, kept: set[str]
+) -> None:
+    """Have what is written through a pointer kept (an extension of numba's analysis of aliases).
+
+    After writing a function into its caller numba throws dead code away, and takes for dead what is
+    written into neither an argument nor what is read later. That a pointer is of an argument's
+    memory it cannot know.
+    """
+    if typemap is not None and isinstance(typemap.get(assignment.target.name), types.CPointer):
+        kept.add(assignment.target.name)
+
+
+alias_analysis_extensions[ir.Assign] = _keep_writes
 
 
 def load_kernels(dim: int, lanes: int) -> ModuleType:

@@ -84,8 +84,7 @@ def note_normal(told, lane, push):
         return
     forces, _, corners, shares = told
     for corner in range(len(corners)):
-        into = force_row(forces, CONTACTS, corners[corner])
-        into[lane] += abs(shares[corner]) * push
+        note(force_row(forces, CONTACTS, corners[corner]), lane, abs(shares[corner]) * push)
 
 
 @kernel
@@ -95,8 +94,7 @@ def note_contact(told, at, push):
         return
     forces, kind, corners, shares = told
     for corner in range(len(corners)):
-        into = force_row(forces, kind, corners[corner] * DIM)
-        into[at] += shares[corner] * push
+        note(force_row(forces, kind, corners[corner] * DIM), at, shares[corner] * push)
 
 
 @kernel

@@ -95,10 +95,9 @@ def _slow_down(lane, work, masses, gained, kinetic, per_mass):
         mean = _momentum(lane, work, masses, k) * per_mass
         for particle in range(masses.inverse_mass.shape[0]):
             at, mass = row(work, particle), inverse_mass_of(masses, particle)
-            # written as `_momentum` reads: LLVM trusts that a row's pointer is not of the array
             if masses.inverse_mass[particle] > 0 and not is_grabbed(mass, at, lane):
-                own = work[particle, VELOCITY + k * LANES + lane] - mean
-                work[particle, VELOCITY + k * LANES + lane] = mean + share * own
+                own = at[VELOCITY + k * LANES + lane] - mean
+                at[VELOCITY + k * LANES + lane] = mean + share * own
 
 
 @kernel
