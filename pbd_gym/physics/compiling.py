@@ -127,20 +127,19 @@ def _row(typing_context: Any, array: Any, index: Any) -> Any:
 row: Any = operator.getitem if _SETTINGS.DISABLE_JIT else intrinsic(_row)
 
 
-def _keep_writes(
-    assignment: Any, arguments: Any, typemap: Any, function: Any, aliases: Any, kept: set[str]
+def _keep_write(
+    write: Any, arguments: Any, typemap: Any, function: Any, aliases: Any, kept: set[str]
 ) -> None:
-    """Have what is written through a pointer kept (an extension of numba's analysis of aliases).
+    """Have what is written into kept (an extension of numba's analysis of aliases).
 
     After writing a function into its caller numba throws dead code away, and takes for dead what is
-    written into neither an argument nor what is read later. That a pointer is of an argument's
-    memory it cannot know.
+    written into neither an argument nor what is read later. That a pointer of `row` points into an
+    argument it cannot know. What is dead indeed LLVM finds.
     """
-    if typemap is not None and isinstance(typemap.get(assignment.target.name), types.CPointer):
-        kept.add(assignment.target.name)
+    kept.add(write.target.name)
 
 
-alias_analysis_extensions[ir.Assign] = _keep_writes
+alias_analysis_extensions[ir.SetItem] = _keep_write
 
 
 def load_kernels(dim: int, lanes: int) -> ModuleType:

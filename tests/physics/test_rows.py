@@ -35,3 +35,36 @@ def test_what_is_written_last_into_a_row_arrives():
     table = np.zeros((2, 3))
     add_one(table, np.ones(2), 1)
     assert table.tolist() == [[0, 1, 0], [0, 1, 0]]
+
+
+@numba.njit
+def row_or_none(table, index):
+    if table is None:
+        return None
+    return row(table, index)
+
+
+def add(at, column):
+    """Add one in a column, if there is a row; written into its callers as `note` is."""
+    if at is not None:
+        at[column] += 1
+
+
+@overload(add, inline="always")
+def _add(at, column):
+    def add_one(at, column):
+        at[column] += 1
+
+    return add_one
+
+
+@numba.njit
+def add_if_there_is_a_row(table, rows, column):
+    for index in range(len(rows)):
+        add(row_or_none(table, rows[index]), column)
+
+
+def test_what_is_written_into_a_row_that_may_be_none_arrives():
+    table = np.zeros((2, 3))
+    add_if_there_is_a_row(table, (1, 0), 2)
+    assert table.tolist() == [[0, 0, 1], [0, 0, 1]]
