@@ -84,15 +84,6 @@ def at_rest(integrator="pbd", iterations=1, gravity=GRAVITY):
     )
 
 
-def felt(integrator):
-    """Gravity [m/s2] as it is felt at rest.
-
-    With RATTLE, what is at rest ends a substep with the second half of the kick in its velocity,
-    and the damping of the next one weakens that.
-    """
-    return GRAVITY if integrator == "pbd" else GRAVITY * 0.5 * (1.0 + np.exp(-DAMPING * H))
-
-
 # Where nothing else is said, a force at rest is a move of g h^2 = 3e-5 m, rounded to 1e-15 m (of
 # positions of 10 m): exact to 1e-10. 1e-9 leaves room for their sums.
 EXACT = {"rtol": 1e-9, "atol": 1e-8}
@@ -101,7 +92,7 @@ EXACT = {"rtol": 1e-9, "atol": 1e-8}
 @every_setting
 def test_implicit_and_slack_ropes_carry_what_hangs_below(integrator, iterations):
     forces, *_ = at_rest(integrator, iterations)
-    below = 0.2 * felt(integrator) * np.arange(5, 0, -1)
+    below = 0.2 * GRAVITY * np.arange(5, 0, -1)
     np.testing.assert_allclose(forces.ropes, [*below, *below], **EXACT)
 
 
@@ -109,7 +100,7 @@ def test_implicit_and_slack_ropes_carry_what_hangs_below(integrator, iterations)
 def test_a_cantilever_bends_at_its_root_with_load_times_arm(integrator, iterations):
     forces, x, _, at = at_rest(integrator, iterations)
     root, free = x[at["rod"][1]], x[at["rod"][2:]]
-    load = 0.2 * felt(integrator) * np.sum(free[:, 0] - root[0])
+    load = 0.2 * GRAVITY * np.sum(free[:, 0] - root[0])
     # its spacing is the arm of the force; they are at right angles but for half of the joint's
     # angle, which is load x spacing/EI = 0.01 rad: 1 - cos(0.005) = 1e-5
     np.testing.assert_allclose(forces.rods[0] * 0.1, load, rtol=3e-5)
@@ -118,16 +109,14 @@ def test_a_cantilever_bends_at_its_root_with_load_times_arm(integrator, iteratio
 @every_setting
 def test_a_tether_carries_a_weight_and_a_strain_limit_what_a_spring_leaves(integrator, iterations):
     forces, *_ = at_rest(integrator, iterations)
-    np.testing.assert_allclose(forces.limits[0], 2.0 * felt(integrator), **EXACT)
-    np.testing.assert_allclose(
-        forces.limits[1] + forces.distances[0], 2.0 * felt(integrator), **EXACT
-    )
+    np.testing.assert_allclose(forces.limits[0], 2.0 * GRAVITY, **EXACT)
+    np.testing.assert_allclose(forces.limits[1] + forces.distances[0], 2.0 * GRAVITY, **EXACT)
 
 
 @every_setting
 def test_an_attachment_carries_what_hangs_on_it(integrator, iterations):
     forces, *_ = at_rest(integrator, iterations)
-    np.testing.assert_allclose(forces.attachments[0], [0.0, 3.0 * felt(integrator)], **EXACT)
+    np.testing.assert_allclose(forces.attachments[0], [0.0, 3.0 * GRAVITY], **EXACT)
 
 
 @every_setting
@@ -136,9 +125,7 @@ def test_the_ground_carries_soft_and_rigid_bodies(integrator, iterations):
     for name, mass, rounding in (("bag", 0.8, 1e-8), ("box", 2.0, 1e-9)):
         # the bag sways with 1 nm/s still: so much per h is 6e-7 m/s2, of 9.81
         carried = np.sum(forces.walls[at[name]], axis=0)
-        np.testing.assert_allclose(
-            carried, [0.0, mass * felt(integrator)], rtol=rounding, atol=1e-6
-        )
+        np.testing.assert_allclose(carried, [0.0, mass * GRAVITY], rtol=rounding, atol=1e-6)
         np.testing.assert_allclose(np.sum(forces.contacts[at[name]]), carried[1], rtol=1e-12)
 
 
@@ -146,9 +133,7 @@ def test_the_ground_carries_soft_and_rigid_bodies(integrator, iterations):
 def test_shape_matching_exerts_no_net_force_and_no_torque(integrator, iterations):
     forces, x, model, _ = at_rest(integrator, iterations)
     pull, arm = forces.shape_matches, x[model.shape_matches.particles]
-    assert np.abs(pull).max() > 0.4 * felt(
-        integrator
-    )  # the upper corners are carried by the lower ones
+    assert np.abs(pull).max() > 0.4 * GRAVITY  # the upper corners are carried by the lower ones
     np.testing.assert_allclose(np.sum(pull, axis=0), 0.0, atol=1e-8)
     torque = np.sum(arm[:, 0] * pull[:, 1] - arm[:, 1] * pull[:, 0])
     np.testing.assert_allclose(torque, 0.0, atol=1e-7)  # arms of 7 m
@@ -158,31 +143,29 @@ def test_shape_matching_exerts_no_net_force_and_no_torque(integrator, iterations
 def test_a_ball_presses_on_a_slope_with_its_share_of_its_weight(integrator, iterations):
     forces, x, _, at = at_rest(integrator, iterations)
     ball = at["ball"][0]
-    np.testing.assert_allclose(forces.colliders[ball], [0.0, 3.0 * felt(integrator)], **EXACT)
+    np.testing.assert_allclose(forces.colliders[ball], [0.0, 3.0 * GRAVITY], **EXACT)
     height = (x[ball, 1] - 1.0) / 0.5
     # pushed out along the normal below the fall of g h^2, not where it began: 3e-5 m of 0.5 m
-    np.testing.assert_allclose(forces.contacts[ball], 3.0 * felt(integrator) * height, rtol=6e-5)
+    np.testing.assert_allclose(forces.contacts[ball], 3.0 * GRAVITY * height, rtol=6e-5)
 
 
 @every_setting
 def test_balls_on_each_other_press_with_the_weight_above(integrator, iterations):
     forces, _, _, at = at_rest(integrator, iterations)
     lower, upper = at["stack"]
-    weight = np.array([0.0, felt(integrator)])
+    weight = np.array([0.0, GRAVITY])
     np.testing.assert_allclose(forces.encounters[[lower, upper]], [-weight, weight], **EXACT)
     np.testing.assert_allclose(forces.walls[lower], 2.0 * weight, **EXACT)
-    np.testing.assert_allclose(
-        forces.contacts[[lower, upper]], [3.0 * felt(integrator), felt(integrator)], **EXACT
-    )
+    np.testing.assert_allclose(forces.contacts[[lower, upper]], [3.0 * GRAVITY, GRAVITY], **EXACT)
 
 
 @every_setting
 def test_a_ball_on_a_beam_presses_on_its_ends_by_the_lever(integrator, iterations):
     forces, _, _, at = at_rest(integrator, iterations)
     shares = np.array([0.7, 0.3, 1.0])
-    np.testing.assert_allclose(forces.contacts[at["beam"]], shares * felt(integrator), **EXACT)
+    np.testing.assert_allclose(forces.contacts[at["beam"]], shares * GRAVITY, **EXACT)
     up = np.array([-0.7, -0.3, 1.0])
-    np.testing.assert_allclose(forces.encounters[at["beam"], 1], up * felt(integrator), **EXACT)
+    np.testing.assert_allclose(forces.encounters[at["beam"], 1], up * GRAVITY, **EXACT)
 
 
 @every_setting

@@ -23,7 +23,7 @@ _PRESSURE = 2.0
 
 
 @kernel
-def find_pairs(work, masses, collision, found, dt):
+def find_pairs(work, masses, collision, found, timing):
     """List, for every lane, the pairs that can come into contact within the control step.
 
     found: pairs (LANES, capacity, 3), their number (LANES,) and scratch (1, LANES). There is room
@@ -34,6 +34,7 @@ def find_pairs(work, masses, collision, found, dt):
     pairs, counts, scratch = found
     particles, rest, distance = collision.particles, masses.positions, collision.distance
     apart = distance * work.dtype.type(_NEIGHBOURHOOD)
+    reach = distance + timing.gravity * timing.dt * timing.dt
     excess = row(scratch, 0)
     for lane in range(LANES):
         counts[lane] = 0
@@ -41,22 +42,22 @@ def find_pairs(work, masses, collision, found, dt):
         a = row(work, particles[first])
         for second in range(first + 1, particles.shape[0]):
             b = row(work, particles[second])
-            if _can_meet(a, b, excess, distance, dt):
+            if _can_meet(a, b, excess, reach, timing.dt):
                 i, j = particles[first], particles[second]
                 if _far_at_rest(rest, i, j, apart):
                     _list_pair(i, j, excess, pairs, counts)
 
 
 @kernel
-def _can_meet(a, b, excess, distance, dt):
+def _can_meet(a, b, excess, reach, dt):
     """Tell whether two particles can meet within dt in any lane: where `excess` [m2] is negative.
 
-    They can where |x_a - x_b| < distance + |v_a - v_b| dt, and (p + q)^2 <= 3/2 p^2 + 3 q^2 saves
-    the root; what it adds at rest allows for velocities that change.
+    They can where |x_a - x_b| < reach + |v_a - v_b| dt, and (p + q)^2 <= 3/2 p^2 + 3 q^2 saves the
+    root; what it adds at rest allows for velocities that change.
     """
-    real = type(distance)
+    real = type(reach)
     zero, near = real(0), False
-    reach, spread = real(1.5) * distance * distance, real(3) * dt * dt
+    within, spread = real(1.5) * reach * reach, real(3) * dt * dt
     for lane in range(LANES):
         square, travel = zero, zero
         for k in range(DIM):
@@ -65,7 +66,7 @@ def _can_meet(a, b, excess, distance, dt):
             motion = a[VELOCITY + at] - b[VELOCITY + at]
             square += delta * delta
             travel += motion * motion
-        beyond = square - reach - spread * travel
+        beyond = square - within - spread * travel
         excess[lane] = beyond
         near |= beyond < zero
     return near
@@ -101,8 +102,8 @@ def _square_distance(a, b, quantity, lane, zero):
 
 
 @kernel
-def collide_with_self(work, masses, collision, found, h, forces):
-    """Push the listed pairs apart to the collision distance, and note which of them touch.
+def collide_with_self(work, masses, collision, found, h, iteration, forces):
+    """Push the listed pairs apart to the collision distance, and note which of them have touched.
 
     A pair that began the substep closer than that is let apart at `_PARTING_SPEED` only (Macklin et
     al. 2019, eq. 10): pushed out at once, it would fly apart at depth/h, and folds that lie through
@@ -123,7 +124,7 @@ def collide_with_self(work, masses, collision, found, h, forces):
             w_b = in_lane(inverse_mass_of(masses, j), b, lane)
             total = w_a + w_b
             touches = zero < square < distance * distance and total > zero
-            pairs[lane, index, 2] = touches
+            pairs[lane, index, 2] = touches or (iteration > 0 and pairs[lane, index, 2] > 0)
             if touches:
                 length = np.sqrt(square)
                 before = np.sqrt(_square_distance(a, b, START, lane, zero))

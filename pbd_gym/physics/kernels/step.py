@@ -69,7 +69,7 @@ def advance(
         for attempt in range(2):
             load(x, v, tile, worlds, work, masses, grabbed)
             aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
-            find_pairs(work, masses, model.self_collision, found, timing.dt)
+            find_pairs(work, masses, model.self_collision, found, timing)
             list_encounters(work, model.encounters, listed, timing)
             for substep in range(substeps):
                 remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
@@ -109,9 +109,14 @@ def advance(
 
 @kernel
 def _predict(work, masses, timing, second_order):
-    """Steps 1-3 of the seed: damp, add the acceleration, move. Second order kicks by half here."""
-    half = work.dtype.type(0.5)
-    h, decay = timing.h, timing.decay
+    """Steps 1-3 of the seed: damp, add the acceleration, move.
+
+    Damped after the kick, what hangs at rest would be lightened. Second order kicks by half here,
+    and has damped in `_finish`, before the other half.
+    """
+    half, one = work.dtype.type(0.5), work.dtype.type(1)
+    h = timing.h
+    decay = timing.decay if second_order is None else one
     inverse_mass, gravity = masses.inverse_mass, masses.gravity
     for particle in range(inverse_mass.shape[0]):
         at = row(work, particle)
@@ -125,7 +130,6 @@ def _predict(work, masses, timing, second_order):
                 at_k = k * LANES + lane
                 at[START + at_k] = at[POSITION + at_k]
                 if free and not is_grabbed(mass, at, lane):
-                    # damping before the kick: it must not lighten what hangs at rest
                     at[VELOCITY + at_k] = at[VELOCITY + at_k] * decay + kick
                     at[POSITION + at_k] += at[VELOCITY + at_k] * h
 
@@ -140,7 +144,7 @@ def _project(work, model, found, timing, iterations, second_order, forces):
             project_hinges(work, masses, model.hinges, inverse_h2, forces)
             project_folds(work, masses, model.folds, inverse_h2, forces)
             project_rods(work, masses, model.rods, inverse_h2, forces)
-            collide_with_self(work, masses, model.self_collision, found, timing.h, forces)
+        collide_with_self(work, masses, model.self_collision, found, timing.h, iteration, forces)
         if second_order is not None:
             project_distances_from_start(
                 work, masses, model.distances, inverse_h2, iteration, forces
@@ -189,7 +193,7 @@ def _collide_with_others(work, model, encounters, listed, timing, forces):
 
 @in_place
 def _finish(work, model, timing, second_order, forces):
-    """Second order: the other half kick, and no velocity along what is rigid."""
+    """Second order: damping, the other half kick, and no velocity along what is rigid."""
     if second_order is None:
         return
     masses = model.particles
@@ -203,6 +207,7 @@ def _finish(work, model, timing, second_order, forces):
                 kick = gravity[k] * timing.h * half
                 for lane in range(LANES):
                     if not is_grabbed(mass, at, lane):
+                        at[VELOCITY + k * LANES + lane] *= timing.decay
                         at[VELOCITY + k * LANES + lane] += kick
     project_distance_velocities(work, masses, model.distances, timing.h, forces)
     project_chain_velocities(work, masses, model.chains, timing.h, forces)
