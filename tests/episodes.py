@@ -73,18 +73,18 @@ def assert_same(a, b):
     assert type(a) is type(b), (a, b)
     if isinstance(a, dict):
         assert a.keys() == b.keys()
-        for key in a:
-            assert_same(a[key], b[key])
+        assert_same([a[key] for key in a], [b[key] for key in a])
     elif isinstance(a, list | tuple):
         assert len(a) == len(b)
         for one, other in zip(a, b, strict=True):
             assert_same(one, other)
+    elif hasattr(a, "detach"):  # a tensor
+        assert_same(a.detach().numpy(), b.detach().numpy())
+    elif isinstance(a, np.ndarray) and a.dtype == object:
+        assert_same(list(a), list(b))
     elif isinstance(a, np.ndarray):
         assert a.dtype == b.dtype
-        if a.dtype == object:
-            assert_same(list(a), list(b))
-        else:
-            np.testing.assert_array_equal(a, b)
+        np.testing.assert_array_equal(a, b)
     elif hasattr(a, "__dataclass_fields__"):
         assert_same(vars(a), vars(b))
     else:
@@ -104,3 +104,18 @@ def flat(observation):
 def nothing(env):
     """The action that asks for no motion."""
     return np.zeros(env.action_space.shape, dtype=np.float32)
+
+
+def outcomes(env, policy, seed):
+    """Mean reward (W,) and the last info of an episode in all worlds."""
+    observation, _ = env.reset(seed=seed)
+    rewards = []
+    for _ in range(env.unwrapped.max_episode_steps):
+        observation, reward, _, _, info = env.step(policy(observation))
+        rewards.append(reward)
+    return np.mean(rewards, axis=0), info
+
+
+def pins(env):
+    """Positions of the pins, (W, P, dim) [m]."""
+    return env.unwrapped.get_state().worlds.x[:, env.unwrapped.task.model.pins].astype(np.float64)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from refusals import refused
 
 from pbd_gym.physics import ModelBuilder, frame_targets, shapes
 
@@ -18,11 +19,6 @@ def tetrahedron():
     builder = ModelBuilder(3)
     builder.add_particles(TETRAHEDRON, 1.0)
     return builder
-
-
-def refused(builder, match):
-    with pytest.raises(ValueError, match=match):
-        builder.build()
 
 
 def test_areas_belong_to_the_plane_and_volumes_to_space():
