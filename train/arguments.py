@@ -14,6 +14,16 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
         super().__init__(prog, max_help_position=34)
 
 
+def sparse_parser(description: str | None, examples: str) -> argparse.ArgumentParser:
+    """Begin a parser; an option that is not given is absent from what it parses."""
+    return argparse.ArgumentParser(
+        description=description,
+        epilog=examples,
+        formatter_class=HelpFormatter,
+        argument_default=argparse.SUPPRESS,
+    )
+
+
 class StoreKeyValues(argparse.Action):
     """Collects `key:value ...`; values are Python literals, or else text."""
 

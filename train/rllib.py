@@ -24,7 +24,7 @@ from typing import Any
 
 import gymnasium
 import yaml
-from arguments import HelpFormatter, StoreKeyValues
+from arguments import StoreKeyValues, sparse_parser
 from config import DEFAULT_ENV, check_at_least, check_registered
 from files import write_atomically
 from interrupt import InterruptRequest
@@ -90,13 +90,8 @@ def new_config(given: dict[str, Any]) -> RllibConfig:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Describe the options; one that is not given is absent from the parsed result."""
-    parser = argparse.ArgumentParser(
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=HelpFormatter,
-        argument_default=argparse.SUPPRESS,
-    )
+    """Describe the options."""
+    parser = sparse_parser(__doc__, EXAMPLES)
     add = parser.add_argument
     add("--env", metavar="ID", help=f"environment (default: {DEFAULT_ENV})")
     for name, text in (

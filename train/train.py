@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
-from arguments import HelpFormatter, StoreKeyValues
+from arguments import StoreKeyValues, sparse_parser
 from config import (
     DEFAULT_ENV,
     TrainingConfig,
@@ -70,13 +70,8 @@ SETTING_ERRORS = (
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Describe the options; one that is not given is absent from the parsed result."""
-    parser = argparse.ArgumentParser(
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=HelpFormatter,
-        argument_default=argparse.SUPPRESS,
-    )
+    """Describe the options."""
+    parser = sparse_parser(__doc__, EXAMPLES)
     task = parser.add_argument_group("what to train")
     task.add_argument("--env", metavar="ID", help=f"environment (default: {DEFAULT_ENV})")
     task.add_argument(
