@@ -38,3 +38,14 @@ def test_a_quick_run_of_scaling_writes_all_files(tmp_path):
         rows = list(csv.DictReader(file))
     assert {row["series"] for row in rows} == {"particles", "worlds", "threads"}
     assert all(0.0 < float(row["least"]) <= float(row["median"]) for row in rows)
+
+
+def test_a_quick_run_of_sb3_frames_compares_all_ways_to_step(tmp_path):
+    options = ("--ids", "PBDPendulum-v0", "--worlds", "4", "--rounds", "1", "--out", tmp_path)
+    printed = run("sb3_frames.py", *options)
+    assert (tmp_path / "sb3_frames.md").read_text(encoding="utf-8") in printed
+    with open(tmp_path / "sb3_frames.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    ways = {"pbd_gym.sb3", "nothing", "DummyVecEnv", "SubprocVecEnv"}
+    assert {row["worlds"] for row in rows} == ways
+    assert all(float(row["collecting"]) > float(row["training"]) > 0.0 for row in rows)
