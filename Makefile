@@ -8,7 +8,7 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench accuracy roofline scaling sb3-frames simd-report baselines gallery rllib-smoke clean
+.PHONY: help train test lint bench accuracy roofline scaling frames simd-report baselines gallery rllib-smoke clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -41,7 +41,7 @@ roofline: .venv/.installed-peers ## compare the kernels' speed with C
 scaling: .venv/.installed-peers ## measure cost against particles, worlds and threads
 	$(BIN)/python benchmarks/scaling.py $(ARGS)
 
-sb3-frames: .venv/.installed-train ## compare the speed of PPO on our batch and on SB3's own environments
+frames: .venv/.installed-train ## compare the speed of PPO on our batch and on SB3's own environments
 	$(BIN)/python benchmarks/sb3_frames.py $(ARGS)
 
 simd-report: .venv/.installed-core ## tell which kernels are vector code
