@@ -8,10 +8,10 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench accuracy roofline scaling frames simd-report baselines gallery rllib-smoke clean
+.PHONY: help train test lint bench throughput budget roofline scaling peers accuracy sb3-frames simd-report baselines gallery rllib-smoke clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 # Called again without ARGS, training goes on where it was cut off; a finished run is only evaluated.
 RUN := runs/PBDRope-v0-ppo-0
@@ -29,11 +29,13 @@ lint: .venv/.installed-all ## check style, formatting, types, imports and spelli
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 
-bench: .venv/.installed-core ## measure control steps per second
+bench: throughput budget roofline scaling peers ## measure all that the next five do, in 10 minutes
+
+throughput: .venv/.installed-core ## measure control steps per second
 	$(BIN)/python benchmarks/throughput.py $(ARGS)
 
-accuracy: .venv/.installed-peers ## compare error and cost with other engines
-	$(BIN)/python benchmarks/accuracy.py $(ARGS)
+budget: .venv/.installed-core ## measure where the time of a control step goes
+	$(BIN)/python benchmarks/budget.py $(ARGS)
 
 roofline: .venv/.installed-peers ## compare the kernels' speed with C
 	$(BIN)/python benchmarks/roofline.py $(ARGS)
@@ -41,7 +43,13 @@ roofline: .venv/.installed-peers ## compare the kernels' speed with C
 scaling: .venv/.installed-peers ## measure cost against particles, worlds and threads
 	$(BIN)/python benchmarks/scaling.py $(ARGS)
 
-frames: .venv/.installed-train ## compare the speed of PPO on our batch and on SB3's own environments
+peers: .venv/.installed-peers ## compare speed with other packages, whichever are installed
+	$(BIN)/python benchmarks/peers.py $(ARGS)
+
+accuracy: .venv/.installed-peers ## compare error and cost with other engines
+	$(BIN)/python benchmarks/accuracy.py $(ARGS)
+
+sb3-frames: .venv/.installed-train ## compare the speed of PPO on our batch and on SB3's own environments
 	$(BIN)/python benchmarks/sb3_frames.py $(ARGS)
 
 simd-report: .venv/.installed-core ## tell which kernels are vector code

@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 from accuracy_engines import fresh_simulation, peer
 from accuracy_scenes import FRAME, GRAVITY, ramp
+from driven import MASS, driven_cloth
 
-from pbd_gym.physics import ModelBuilder, World, shapes
+from pbd_gym.physics import World
 
 SIZE = 16
-_MASS = 0.2
-_SPACING = 1.0 / (SIZE - 1)
 # The corners come together for a second and hang for one, then the driven one swings for two.
 _SETTLE, _SWING = 120, 120
 FRAMES = _SETTLE + _SWING
@@ -47,11 +46,11 @@ def corner(at: float) -> tuple[float, float]:
 
 
 def worst_strain(x: np.ndarray) -> float:
-    """Return the greatest stretch of a link along a thread; x is (..., SIZE, SIZE, 3)."""
+    """Return the greatest stretch of a link along a thread of 1 m; x is (..., size, size, 3)."""
     worst = 0.0
     for axis in (-3, -2):
         lengths = np.sqrt(np.sum(np.diff(x, axis=axis) ** 2, axis=-1))
-        worst = max(worst, float((lengths / _SPACING - 1.0).max()))
+        worst = max(worst, float((lengths * (x.shape[axis] - 1) - 1.0).max()))
     return worst if np.isfinite(x).all() else float("inf")
 
 
@@ -73,18 +72,7 @@ def _pypbd_entries() -> Iterator[ClothEntry]:
 
 
 def _ours(substeps: int) -> ClothRun:
-    builder = ModelBuilder(3)
-    grid = shapes.cloth(
-        builder,
-        (0.0, 0.0, 0.0),
-        (0.0, 0.0, -1.0),
-        (1.0, 0.0, 0.0),
-        (SIZE, SIZE),
-        mass=_MASS,
-        stretch_compliance=0.0,
-    )
-    builder.pin([grid[0, 0], grid[0, -1]])
-    model = builder.build(gravity=(0.0, 0.0, -GRAVITY))
+    model = driven_cloth(SIZE).model
     world = World(model, _WORLDS, num_threads=1)
     targets = np.zeros((FRAMES, _WORLDS, 2, 3), dtype=np.float32)
     for frame in range(FRAMES):
@@ -105,24 +93,30 @@ def _ours(substeps: int) -> ClothRun:
     return run
 
 
-def _mujoco(steps: int, solver: str) -> ClothRun:
-    mj = peer("MuJoCo")
+def mujoco_cloth(size: int, steps: int, solver: str) -> Any:
+    """Return MuJoCo's model of a cloth of 1 m (steps per 1/60 s).
 
-    # vertex 0 is the lower left one; the columns run upwards
-    fixed, driven = SIZE - 1, SIZE * SIZE - 1
+    Mocap body 1 drives a corner. Vertex 0 is the lower left one; the columns run upwards.
+    """
+    fixed, driven, spacing = size - 1, size * size - 1, 1.0 / (size - 1)
     hold = 'anchor="0 0 0" solref="0.001 1" solimp="0.999 0.9999 0.001"'
-    model = mj.MjModel.from_xml_string(
+    return peer("MuJoCo").MjModel.from_xml_string(
         f'<mujoco><option timestep="{FRAME / steps}" gravity="0 0 {-GRAVITY}" '
         f'integrator="discrete" solver="{solver}" iterations="50">'
         '<flag contact="disable"/></option><worldbody>'
         '<body name="fixed" mocap="true"/><body name="driven" mocap="true" pos="1 0 0"/>'
-        f'<flexcomp name="cloth" type="grid" dim="2" count="{SIZE} {SIZE} 1" mass="{_MASS}" '
-        f'spacing="{_SPACING} {_SPACING} {_SPACING}" radius="0.001" euler="90 0 0" '
+        f'<flexcomp name="cloth" type="grid" dim="2" count="{size} {size} 1" mass="{MASS}" '
+        f'spacing="{spacing} {spacing} {spacing}" radius="0.001" euler="90 0 0" '
         'pos="0.5 0 -0.5"><contact selfcollide="none"/><elasticity young="3e6" poisson="0" '
         'thickness="1e-3" elastic2d="stretch" damping="1e-3"/></flexcomp></worldbody><equality>'
         f'<connect body1="cloth_{fixed}" body2="fixed" {hold}/>'
         f'<connect body1="cloth_{driven}" body2="driven" {hold}/></equality></mujoco>'
     )
+
+
+def _mujoco(steps: int, solver: str) -> ClothRun:
+    mj = peer("MuJoCo")
+    model = mujoco_cloth(SIZE, steps, solver)
     data = mj.MjData(model)
 
     def run() -> tuple[float, float]:
@@ -141,14 +135,33 @@ def _mujoco(steps: int, solver: str) -> ClothRun:
     return run
 
 
-def _pypbd(substeps: int, iterations: int) -> ClothRun:
-    pbd = peer("pyPBD")
+def pypbd_cloth(size: int, h: float, iterations: int, substeps: int = 1) -> Any:
+    """Return pyPBD's simulation of a cloth: rows, columns and soft diagonals.
 
+    The particle that drives a corner is `size - 1`; gravity points along -y.
+    """
+    simulation = fresh_simulation(peer("pyPBD"), h, iterations, substeps)
+    model, spacing = simulation.getModel(), 1.0 / (size - 1)
+    points = model.getParticles()
+    for row, column in product(range(size), repeat=2):
+        points.addVertex(np.array([column * spacing, -row * spacing, 0.0]))
+        index = row * size + column
+        points.setMass(index, 0.0 if index in (0, size - 1) else MASS / size**2)
+    grid = np.arange(size * size).reshape(size, size)
+    for thread in (*grid, *grid.T):
+        for a, b in pairwise(thread):
+            model.addDistanceConstraint(int(a), int(b), 1.0)
+    for a, b in ((grid[:-1, :-1], grid[1:, 1:]), (grid[:-1, 1:], grid[1:, :-1])):
+        for i, j in zip(a.ravel(), b.ravel(), strict=True):
+            model.addDistanceConstraint_XPBD(int(i), int(j), 1e3)
+    return simulation
+
+
+def _pypbd(substeps: int, iterations: int) -> ClothRun:
     def run() -> tuple[float, float]:
-        simulation = fresh_simulation(pbd, FRAME / substeps, iterations)
+        simulation = pypbd_cloth(SIZE, FRAME / substeps, iterations)
         model = simulation.getModel()
         points = model.getParticles()
-        _weave(model, points)
         stepper = simulation.getTimeStep()
         worst, seconds = 0.0, 0.0
         for frame in range(FRAMES):
@@ -163,22 +176,6 @@ def _pypbd(substeps: int, iterations: int) -> ClothRun:
         return worst, seconds
 
     return run
-
-
-def _weave(model: Any, points: Any) -> None:
-    """Add rows, columns and soft diagonals to pyPBD's model; its gravity points along -y."""
-    for row in range(SIZE):
-        for column in range(SIZE):
-            points.addVertex(np.array([column * _SPACING, -row * _SPACING, 0.0]))
-            index = row * SIZE + column
-            points.setMass(index, 0.0 if index in (0, SIZE - 1) else _MASS / SIZE**2)
-    grid = np.arange(SIZE * SIZE).reshape(SIZE, SIZE)
-    for thread in (*grid, *grid.T):
-        for a, b in pairwise(thread):
-            model.addDistanceConstraint(int(a), int(b), 1.0)
-    for a, b in ((grid[:-1, :-1], grid[1:, 1:]), (grid[:-1, 1:], grid[1:, :-1])):
-        for i, j in zip(a.ravel(), b.ravel(), strict=True):
-            model.addDistanceConstraint_XPBD(int(i), int(j), 1e3)
 
 
 def _positions(points: Any) -> np.ndarray:

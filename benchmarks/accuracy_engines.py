@@ -105,23 +105,27 @@ def mujoco() -> Iterator[Entry]:
             )
 
 
-def _mujoco(scene: ChainScene, integrator: str, steps: int) -> Run:
-    mj = peer("MuJoCo")
-
+def mujoco_chain(scene: ChainScene, integrator: str, steps: int, joint: str = "") -> Any:
+    """Return MuJoCo's model of a chain of hinges whose pivot stays, so many steps per 1/60 s."""
     bodies, place = "", "0 0 0"
     for length, mass in zip(scene.lengths, scene.masses, strict=True):
         # MuJoCo wants an inertia: one so small that the links are point masses on rods
         inertia = 1e-6 * mass * length**2
         bodies += (
-            f'<body pos="{place}"><joint type="hinge" axis="0 -1 0"/><inertial pos="0 0 {-length}" '
-            f'mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>'
+            f'<body pos="{place}"><joint type="hinge" axis="0 -1 0" {joint}/><inertial '
+            f'pos="0 0 {-length}" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>'
         )
         place = f"0 0 {-length}"
-    model = mj.MjModel.from_xml_string(
+    return peer("MuJoCo").MjModel.from_xml_string(
         f'<mujoco><option timestep="{FRAME / steps}" integrator="{integrator}" '
         f'gravity="0 0 {-GRAVITY}"><flag contact="disable" constraint="disable"/></option>'
         f"<worldbody>{bodies}{'</body>' * len(scene.masses)}</worldbody></mujoco>"
     )
+
+
+def _mujoco(scene: ChainScene, integrator: str, steps: int) -> Run:
+    mj = peer("MuJoCo")
+    model = mujoco_chain(scene, integrator, steps)
     data = mj.MjData(model)
     times = (np.arange(scene.frames * steps) + 0.5) * (FRAME / steps)
     push = [-scene.pivot_acceleration(at) for at in times]
@@ -161,21 +165,27 @@ def pypbd() -> Iterator[Entry]:
             )
 
 
-def _pypbd(scene: ChainScene, substeps: int, iterations: int) -> Run:
-    pbd = peer("pyPBD")
+def pypbd_chain(scene: ChainScene, h: float, iterations: int, substeps: int = 1) -> Any:
+    """Return pyPBD's simulation of a chain; its particle 0 is the pivot."""
+    simulation = fresh_simulation(peer("pyPBD"), h, iterations, substeps)
+    model = simulation.getModel()
+    points = model.getParticles()
+    for index, (x, y) in enumerate(scene.start):
+        points.addVertex(np.array([x, y, 0.0]))
+        points.setMass(index, scene.masses[index - 1] if index else 0.0)
+    for index in range(len(scene.masses)):
+        model.addDistanceConstraint(index, index + 1, 1.0)
+    return simulation
 
+
+def _pypbd(scene: ChainScene, substeps: int, iterations: int) -> Run:
     times = np.arange(1, scene.frames * substeps + 1) * (FRAME / substeps)
     pivots = [(scene.pivot(at), 0.0, 0.0) for at in times]
 
     def run() -> tuple[np.ndarray, float]:
-        simulation = fresh_simulation(pbd, FRAME / substeps, iterations)
+        simulation = pypbd_chain(scene, FRAME / substeps, iterations)
         model = simulation.getModel()
         points = model.getParticles()
-        for index, (x, y) in enumerate(scene.start):
-            points.addVertex(np.array([x, y, 0.0]))
-            points.setMass(index, scene.masses[index - 1] if index else 0.0)
-        for index in range(len(scene.masses)):
-            model.addDistanceConstraint(index, index + 1, 1.0)
         stepper, last = simulation.getTimeStep(), len(scene.masses)
         stepper.step(model)  # groups the constraints; the run begins after it
         for index, (x, y) in enumerate(scene.start):
@@ -193,8 +203,11 @@ def _pypbd(scene: ChainScene, substeps: int, iterations: int) -> Run:
     return run
 
 
-def fresh_simulation(pbd: Any, h: float, iterations: int) -> Any:
-    """Return pyPBD's one simulation, emptied, with a time step and number of iterations."""
+def fresh_simulation(pbd: Any, h: float, iterations: int, substeps: int = 1) -> Any:
+    """Return pyPBD's one simulation, emptied, with a time step and what is done in it.
+
+    A pin can be moved in every substep only where a step has no more than one.
+    """
     pbd.Logger.activated = False
     simulation = pbd.Simulation.getCurrent()
     if simulation.getModel() is None:
@@ -202,8 +215,7 @@ def fresh_simulation(pbd: Any, h: float, iterations: int) -> Any:
     simulation.getModel().cleanup()
     simulation.getModel().init()
     stepper = simulation.getTimeStep()
-    # one substep a step: this way a pin can be moved in each
-    stepper.setValueUInt(pbd.TimeStepController.NUM_SUB_STEPS, 1)
+    stepper.setValueUInt(pbd.TimeStepController.NUM_SUB_STEPS, substeps)
     stepper.setValueUInt(pbd.TimeStepController.MAX_ITERATIONS, iterations)
     pbd.TimeManager.getCurrent().setTimeStepSize(h)
     return simulation
@@ -220,33 +232,37 @@ def pymunk() -> Iterator[Entry]:
             )
 
 
-def _pymunk(scene: ChainScene, steps: int, iterations: int, error_bias: float) -> Run:
+def pymunk_chain(scene: ChainScene, iterations: int, error_bias: float) -> tuple[Any, list[Any]]:
+    """Return pymunk's space and bodies of a chain; body 0 is the pivot, to be moved by velocity."""
     pm = peer("pymunk")
+    space = pm.Space()
+    space.gravity, space.iterations = (0.0, -GRAVITY), iterations
+    bodies = [pm.Body(body_type=pm.Body.KINEMATIC)]
+    space.add(bodies[0])
+    for mass, place in zip(scene.masses, scene.start[1:], strict=True):
+        body = pm.Body(mass, float("inf"))
+        body.position = tuple(place)
+        joint = pm.PinJoint(bodies[-1], body)
+        # the share of a length error that is left after a second: the default drifts apart
+        joint.error_bias = error_bias
+        space.add(body, joint)
+        bodies.append(body)
+    return space, bodies
 
+
+def _pymunk(scene: ChainScene, steps: int, iterations: int, error_bias: float) -> Run:
     dt = FRAME / steps
     times = np.arange(1, scene.frames * steps + 1) * dt
     path = np.array([0.0, *(scene.pivot(at) for at in times)])
     speeds = np.diff(path) / dt
 
     def run() -> tuple[np.ndarray, float]:
-        space = pm.Space()
-        space.gravity, space.iterations = (0.0, -GRAVITY), iterations
-        pivot = pm.Body(body_type=pm.Body.KINEMATIC)
-        space.add(pivot)
-        bodies = [pivot]
-        for mass, place in zip(scene.masses, scene.start[1:], strict=True):
-            body = pm.Body(mass, float("inf"))
-            body.position = tuple(place)
-            joint = pm.PinJoint(bodies[-1], body)
-            # the share of a length error that is left after a second: the default drifts apart
-            joint.error_bias = error_bias
-            space.add(body, joint)
-            bodies.append(body)
+        space, bodies = pymunk_chain(scene, iterations, error_bias)
         tip = np.empty((scene.frames, 2))
         began = time.perf_counter()
         for frame in range(scene.frames):
             for step in range(steps):
-                pivot.velocity = (speeds[frame * steps + step], 0.0)
+                bodies[0].velocity = (speeds[frame * steps + step], 0.0)
                 space.step(dt)
             tip[frame] = bodies[-1].position
         return tip, time.perf_counter() - began

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import statistics
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -69,3 +71,23 @@ def write(folder: Path, name: str, rows: Sequence[Any], text: str) -> None:
     text = f"Measured on {describe_machine()}.\n\n{text}\n"
     (folder / f"{name}.md").write_text(text, encoding="utf-8")
     print(text)
+
+
+def draw(figure: Callable[[Sequence[Any], Path], bool], rows: Sequence[Any], path: Path) -> None:
+    """Draw rows into a file; say so where matplotlib is missing (`figure` returns False then)."""
+    if not figure(rows, path):
+        print("no figure: matplotlib is missing: pip install -e '.[peers]'", file=sys.stderr)
+
+
+def benchmark_parser(
+    description: str | None, *, rounds: int, seconds: float, quick: str
+) -> argparse.ArgumentParser:
+    """Return a parser of what all benchmarks here are told, with their defaults."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--rounds", type=int, default=rounds, help=f"(default: {rounds})")
+    parser.add_argument(
+        "--seconds", type=float, default=seconds, help=f"of a turn (default: {seconds})"
+    )
+    parser.add_argument("--quick", action="store_true", help=quick)
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results")
+    return parser

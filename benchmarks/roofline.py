@@ -8,19 +8,17 @@ is what ours is compared with. Times are of the thread, so that other processes 
 
 from __future__ import annotations
 
-import argparse
 import functools
 import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from accuracy_scenes import FRAME
 from driven import Driven, driven_cloth, driven_rope
 from native import COMPILER, FLAGS, NativeWorld, compiler_version, has_compiler
-from records import RESULTS, in_turn, table, write
+from records import benchmark_parser, in_turn, table, write
 
 from pbd_gym.physics import World
 
@@ -118,11 +116,7 @@ def report(rows: Sequence[Row]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure; write CSV and table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=9, help="(default: 9)")
-    parser.add_argument("--seconds", type=float, default=0.1, help="of a turn (default: 0.1)")
-    parser.add_argument("--quick", action="store_true", help="the rope alone, briefly")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results")
+    parser = benchmark_parser(__doc__, rounds=9, seconds=0.1, quick="the rope alone, briefly")
     options = parser.parse_args(arguments)
     if not has_compiler():
         print(f"left out: no C compiler `{COMPILER}`: apt-get install gcc", file=sys.stderr)

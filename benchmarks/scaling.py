@@ -8,7 +8,6 @@ step down, the fastest round counts.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -17,7 +16,7 @@ from typing import NamedTuple
 
 from accuracy_scenes import FRAME
 from driven import Driven, driven_cloth, driven_rope
-from records import RESULTS, in_turn, table, write
+from records import benchmark_parser, draw, in_turn, table, write
 
 from pbd_gym.physics import World
 
@@ -151,11 +150,7 @@ def draw_figure(rows: Sequence[Row], path: Path) -> bool:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure; write CSV, table and figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=15, help="(default: 15)")
-    parser.add_argument("--seconds", type=float, default=0.02, help="of a turn (default: 0.02)")
-    parser.add_argument("--quick", action="store_true", help="few sizes, briefly")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results")
+    parser = benchmark_parser(__doc__, rounds=15, seconds=0.02, quick="few sizes, briefly")
     options = parser.parse_args(arguments)
     ropes, cloths, worlds = _ROPES, _CLOTHS, _WORLDS
     if options.quick:
@@ -171,8 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         both = [(scene, count, threads) for count in worlds if count > 32 for threads in (1, 2)]
         rows += measure("threads", both, options.rounds, options.seconds)
     write(options.out, "scaling", rows, report(rows))
-    if not draw_figure(rows, options.out / "scaling.png"):
-        print("no figure: matplotlib is missing: pip install -e '.[peers]'", file=sys.stderr)
+    draw(draw_figure, rows, options.out / "scaling.png")
     return 0
 
 

@@ -15,13 +15,13 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from machine import describe_machine
+from records import benchmark_parser, draw
 from report import draw_figure, markdown
 from start_up import measure_start_up
 
@@ -29,7 +29,6 @@ import pbd_gym
 from pbd_gym.physics import World
 
 gymnasium.register_envs(pbd_gym)
-RESULTS = Path(__file__).parent / "results"
 WORLDS = (1, 64, 1024, 4096)
 THREADS = (1, 2)
 # The pendulums share their kernels.
@@ -196,8 +195,11 @@ def task_ids() -> list[str]:
 def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Read the command line."""
     ids = task_ids()
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    parser = benchmark_parser(
+        __doc__,
+        rounds=5,
+        seconds=0.25,
+        quick="2 rounds of 0.02 s, 1 and 64 worlds, no start-up times: to see that it works",
     )
     parser.add_argument(
         "--ids", nargs="+", default=ids, choices=ids, metavar="ID", help=f"of {', '.join(ids)}"
@@ -205,26 +207,8 @@ def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--worlds", nargs="+", type=int, default=WORLDS, metavar="N", help="(default: %(default)s)"
     )
-    parser.add_argument("--rounds", type=int, default=5, metavar="N", help="(default: 5)")
-    parser.add_argument(
-        "--seconds",
-        type=float,
-        default=0.25,
-        help="that each case runs in each round, at least one step (default: 0.25)",
-    )
-    parser.add_argument(
-        "--quick",
-        action="store_true",
-        help="2 rounds of 0.02 s, 1 and 64 worlds, no start-up times: to see that it works",
-    )
     parser.add_argument(
         "--no-start-up", action="store_true", help="do not time fresh processes and compilation"
-    )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=RESULTS,
-        help="folder of throughput.csv, .md and .png (default: benchmarks/results)",
     )
     options = parser.parse_args(arguments)
     if options.rounds < 1 or min(options.worlds) < 1:
@@ -256,8 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             speeds = [f"{value:.{digits}f}" for value in row[4:7]]
             writer.writerow([*row[:4], *speeds, row.rounds])
     (options.out / "throughput.md").write_text(text, encoding="utf-8")
-    if not draw_figure(rows, options.out / "throughput.png"):
-        print("no figure: matplotlib is not installed", file=sys.stderr)
+    draw(draw_figure, rows, options.out / "throughput.png")
     return 0
 
 

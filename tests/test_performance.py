@@ -49,3 +49,16 @@ def test_a_quick_run_of_sb3_frames_compares_all_ways_to_step(tmp_path):
     ways = {"pbd_gym.sb3", "nothing", "DummyVecEnv", "SubprocVecEnv"}
     assert {row["worlds"] for row in rows} == ways
     assert all(float(row["collecting"]) > float(row["training"]) > 0.0 for row in rows)
+
+
+def test_the_shares_of_a_step_add_up_to_the_whole(tmp_path):
+    printed = run("budget.py", "--quick", "--out", tmp_path)
+    assert (tmp_path / "budget.md").read_text(encoding="utf-8") in printed
+    with open(tmp_path / "budget.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for worlds in ("1", "64"):
+        own = {row["part"]: float(row["microseconds"]) for row in rows if row["worlds"] == worlds}
+        whole = own.pop("step")
+        assert set(own) == {"actions", "kernel", "reward", "observation", "reset", "Python"}
+        assert 0.0 < own["kernel"] < whole
+        assert sum(own.values()) >= 0.99 * whole  # "Python" is what is left, but not below 0

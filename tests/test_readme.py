@@ -99,6 +99,8 @@ def test_the_table_of_environments_is_of_today(id):
     [
         ("README.md", "speed", "throughput.md"),
         ("docs/physics.md", "accuracy", "accuracy.md"),
+        ("docs/performance.md", "peers", "peers.md"),
+        ("docs/performance.md", "budget", "budget.md"),
         ("docs/performance.md", "roofline", "roofline.md"),
         ("docs/performance.md", "scaling", "scaling.md"),
     ],

@@ -10,6 +10,7 @@ import gymnasium
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import throughput
+from records import RESULTS
 from report import markdown
 
 
@@ -75,7 +76,7 @@ def test_the_table_gives_medians_and_shares_of_the_kernel():
 
 
 def test_the_committed_results_cover_every_environment():
-    rows = read(throughput.RESULTS)
+    rows = read(RESULTS)
     assert {row["id"] for row in rows} == set(throughput.task_ids())
     assert {int(row["worlds"]) for row in rows if row["measure"] == "make_vec"} == set(
         throughput.WORLDS
