@@ -8,10 +8,10 @@ ARGS ?=
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint bench throughput budget roofline scaling peers accuracy sb3-frames simd-report baselines gallery rllib-smoke clean
+.PHONY: help train test lint bench throughput budget roofline scaling peers accuracy frames simd-report baselines gallery rllib-smoke clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 # Called again without ARGS, training goes on where it was cut off; a finished run is only evaluated.
 RUN := runs/PBDRope-v0-ppo-0
@@ -49,7 +49,7 @@ peers: .venv/.installed-peers ## compare speed with other packages, whichever ar
 accuracy: .venv/.installed-peers ## compare error and cost with other engines
 	$(BIN)/python benchmarks/accuracy.py $(ARGS)
 
-sb3-frames: .venv/.installed-train ## compare the speed of PPO on our batch and on SB3's own environments
+frames: .venv/.installed-train ## compare the speed of PPO on our batch and on SB3's own environments
 	$(BIN)/python benchmarks/sb3_frames.py $(ARGS)
 
 simd-report: .venv/.installed-core ## tell which kernels are vector code
