@@ -33,8 +33,9 @@ class Pictures:
         self.task, self.look = task, Look(size, camera, color, theme, show)
         self.renderer: Renderer | None = None
         self.window: Window | None = None
+        self._drawn = render_mode is not None
         self._steps = np.zeros(worlds, dtype=np.int64)  # since each episode began
-        self._follows = render_mode is not None and "trail" in self.look.show
+        self._follows = self._drawn and "trail" in self.look.show
         self._past: list[np.ndarray] = []  # positions (W, N, dim) from the oldest on
 
     @property
@@ -53,7 +54,9 @@ class Pictures:
             self._past[-1][worlds] = batch.world.x[worlds]
 
     def advance(self, batch: Batch) -> None:
-        """Note that a control step has passed."""
+        """Note that a control step has passed, if any picture can be asked for."""
+        if not self._drawn:
+            return
         self._steps += 1
         if self._follows:
             self._past.append(batch.world.x.copy())

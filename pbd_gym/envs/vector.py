@@ -250,15 +250,26 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
 
 def _infos(info: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
     """Return Gymnasium's vector format: each array, 0 where masked out, and its mask."""
-    if not mask.any():
-        return {}
-    whole = mask.all()
+    shown, hidden = np.flatnonzero(mask), np.flatnonzero(~mask)
     infos: dict[str, Any] = {}
+    if not len(shown):
+        return infos
     for name, values in info.items():
         wide = values.astype(np.float64) if values.dtype == np.float32 else values
-        infos[name] = wide if whole else np.where(mask, wide, wide.dtype.type(0))
+        infos[name] = _masked(wide, shown, hidden) if len(hidden) else wide
         infos[f"_{name}"] = mask.copy()
     return infos
+
+
+def _masked(values: np.ndarray, shown: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+    """Return a copy of values that is 0 where hidden; writes the fewer of the two."""
+    if len(shown) < len(hidden):
+        result = np.zeros_like(values)
+        result[shown] = values[shown]
+    else:
+        result = values.copy()
+        result[hidden] = 0
+    return result
 
 
 def _check_count(name: str, value: Any) -> None:

@@ -155,11 +155,12 @@ class Batch:
         expected = (self.world.num_worlds, *self.task.action_space.shape)
         if array.shape != expected:
             raise ValueError(f"actions have shape {array.shape}; expected {expected}")
-        wide = _float64(array)
-        clipped, excess = np.empty(expected, dtype=np.float32), np.empty(len(wide))
-        if not clip_actions(wide, clipped, excess):
-            world, index = np.argwhere(~np.isfinite(wide))[0]
-            raise ValueError(f"action {index} of world {world} is {wide[world, index]}")
+        if array.dtype != np.float32:
+            array = _float64(array)
+        clipped, excess = np.empty(expected, dtype=np.float32), np.empty(len(array))
+        if not clip_actions(np.ascontiguousarray(array), clipped, excess):
+            world, index = np.argwhere(~np.isfinite(array))[0]
+            raise ValueError(f"action {index} of world {world} is {array[world, index]}")
         return clipped, excess
 
     def _put_back_diverged(self) -> np.ndarray:

@@ -14,7 +14,7 @@ def clip_actions(actions: Any, clipped: Any, excess: Any) -> bool:
     """Clip actions to [-1, 1]; return whether all of them are finite.
 
     Args:
-        actions: (n, size) float64.
+        actions: (n, size).
         clipped: (n, size), written.
         excess: (n,) by how much an action of a world was clipped at most, written.
     """
@@ -22,7 +22,7 @@ def clip_actions(actions: Any, clipped: Any, excess: Any) -> bool:
     for world in range(actions.shape[0]):
         most = 0.0
         for index in range(actions.shape[1]):
-            action = actions[world, index]
+            action = np.float64(actions[world, index])
             finite &= abs(action) < np.inf  # not so for NaN either
             within = min(max(action, -1.0), 1.0)
             clipped[world, index] = within

@@ -41,44 +41,76 @@ def drive_pins(
         short: (n,) by how much the velocities fall short of the desired ones at most, in units of
             the maximal speed, written.
     """
-    dt, max_speed, acceleration = limits[0], limits[1], limits[2]
-    change = acceleration * dt
     count, dim = pins.shape[0], x.shape[2]
-    for world in range(x.shape[0]):
-        for index in range(count):
-            for axis in range(dim):
-                at, speed = x[world, pins[index], axis], v[world, pins[index], axis]
-                desired = _desired(action[world], axes, index, axis, max_speed)
-                speed += min(max(desired - speed, -change), change)
-                speed = min(speed, _braking_speed(workspace[1, axis] - at, acceleration, dt))
-                speed = max(speed, -_braking_speed(at - workspace[0, axis], acceleration, dt))
-                target = min(max(at + speed * dt, workspace[0, axis]), workspace[1, axis])
-                targets[world, index, axis] = target
-        if count == 2:
+    short[:] = 0
+    for index in range(count):
+        for axis in range(dim):
+            column = _column(axes, index, axis)
+            _aim(x, v, action, pins[index], axis, column, workspace, limits, targets[:, index])
+    if count == 2:
+        for world in range(x.shape[0]):
             _keep_together(targets[world], limits[3])
-            _slow_down(x[world], pins, targets[world], max_speed * dt)
-        short[world] = 0
-        for index in range(count):
-            for axis in range(dim):
-                speed = (targets[world, index, axis] - x[world, pins[index], axis]) / dt
-                desired = _desired(action[world], axes, index, axis, max_speed)
-                short[world] = max(short[world], abs(desired - speed) / max_speed)
+            _slow_down(x[world], pins, targets[world], limits[1] * limits[0])
+    for index in range(count):
+        for axis in range(dim):
+            column = _column(axes, index, axis)
+            _fall_short(x, action, pins[index], axis, column, limits, targets[:, index], short)
 
 
 @kernel
-def _desired(action: Any, axes: Any, index: int, axis: int, max_speed: Any) -> Any:
-    """Return the desired velocity of a pin along an axis: 0 along those that no action moves."""
+def _column(axes: Any, index: int, axis: int) -> int:
+    """Return the place in an action that moves a pin along an axis, -1 if there is none."""
     for place in range(axes.shape[0]):
         if axes[place] == axis:
-            return action[index * axes.shape[0] + place] * max_speed
-    return max_speed * 0
+            return index * axes.shape[0] + place
+    return -1
 
 
 @kernel
-def _braking_speed(distance: Any, acceleration: Any, dt: Any) -> Any:
-    """Return the greatest speed from which a pin can stop within a distance [m/s]."""
-    way = max(distance, distance * 0)
-    return acceleration * (np.sqrt(dt * dt + (way + way) / acceleration) - dt)
+def _aim(
+    x: Any,
+    v: Any,
+    action: Any,
+    pin: int,
+    axis: int,
+    column: int,
+    workspace: Any,
+    limits: Any,
+    targets: Any,
+) -> None:
+    """Write the targets (n, dim) of one pin along one axis. No branch or call: vector code."""
+    dt, max_speed, acceleration = limits[0], limits[1], limits[2]
+    change, none = acceleration * dt, acceleration * 0
+    low, high = workspace[0, axis], workspace[1, axis]
+    for world in range(x.shape[0]):
+        at, speed = x[world, pin, axis], v[world, pin, axis]
+        desired = action[world, column] * max_speed if column >= 0 else none
+        more = desired - speed
+        more = more if more > -change else -change
+        speed += more if more < change else change
+        # the greatest speeds from which it can stop at either edge
+        above, below = high - at, at - low
+        above = above if above > none else none
+        below = below if below > none else none
+        fastest = acceleration * (np.sqrt(dt * dt + (above + above) / acceleration) - dt)
+        slowest = -(acceleration * (np.sqrt(dt * dt + (below + below) / acceleration) - dt))
+        speed = fastest if fastest < speed else speed
+        speed = slowest if slowest > speed else speed
+        target = at + speed * dt
+        target = low if low > target else target
+        targets[world, axis] = high if high < target else target
+
+
+@kernel
+def _fall_short(
+    x: Any, action: Any, pin: int, axis: int, column: int, limits: Any, targets: Any, short: Any
+) -> None:
+    """Raise `short` (n,) to what one pin lacks of its desired velocity along one axis."""
+    dt, max_speed = limits[0], limits[1]
+    for world in range(x.shape[0]):
+        desired = action[world, column] * max_speed if column >= 0 else max_speed * 0
+        lack = abs(desired - (targets[world, axis] - x[world, pin, axis]) / dt) / max_speed
+        short[world] = lack if lack > short[world] else short[world]
 
 
 @kernel

@@ -13,7 +13,7 @@ from pbd_gym.physics.compiling import entry
 from pbd_gym.physics.portable import cos_sin
 from pbd_gym.tasks.balancing import SwingUp
 from pbd_gym.tasks.base import Draw, Judgement, Start, Task, Variables, draw, number
-from pbd_gym.tasks.rewards import near, quiet
+from pbd_gym.tasks.rewards import near_each, quiet
 
 _PI = 3.141592653589793
 
@@ -242,21 +242,28 @@ def _judge(
         reached: (n,) bool, written.
     """
     links = x.shape[1] - 1
+    upright, centred, slow, still, reward = parts[0], parts[1], parts[2], parts[3], parts[4]
     for world in range(x.shape[0]):
         pivot = np.float64(x[world, 0, 0])
-        total, slow, up = 0.0, 1.0, True
-        for link in range(links):
+        upright[world], centred[world], slow[world] = 0.0, pivot, 1.0
+        still[world] = quiet(np.float64(action[world, 0]))
+        reached[world] = abs(pivot) < 0.75 * rail
+    near_each(centred, rail)
+    for link in range(links):
+        rate = reward  # a row that is not needed yet
+        for world in range(x.shape[0]):
             height = np.float64(x[world, link + 1, 1] - x[world, link, 1]) / link_length
             height = min(max(height, -1.0), 1.0)
-            total += 0.5 * (1.0 + height)
-            up &= height > least
+            upright[world] += 0.5 * (1.0 + height)
+            reached[world] &= height > least
             # links keep their length, so the rate of a direction is the angular velocity
             across = np.float64(v[world, link + 1, 0] - v[world, link, 0]) / link_length
             along = np.float64(v[world, link + 1, 1] - v[world, link, 1]) / link_length
-            slow = min(slow, near(np.sqrt(across * across + along * along), 5.0))
-        upright, centred = total / links, near(pivot, rail)
-        still = quiet(np.float64(action[world, 0]))
-        reward = upright * (1.0 + centred) * (1.0 + slow) * (4.0 + still) / 20.0
-        parts[0, world], parts[1, world], parts[2, world] = upright, centred, slow
-        parts[3, world], parts[4, world] = still, reward
-        reached[world] = up and abs(pivot) < 0.75 * rail
+            rate[world] = np.sqrt(across * across + along * along)
+        near_each(rate, 5.0)
+        for world in range(x.shape[0]):
+            slow[world] = min(slow[world], rate[world])
+    for world in range(x.shape[0]):
+        upright[world] /= links
+        product = upright[world] * (1.0 + centred[world]) * (1.0 + slow[world])
+        reward[world] = product * (4.0 + still[world]) / 20.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pbd_gym.physics.compiling import kernel
 from pbd_gym.physics.portable import exp_scalar
 
@@ -14,6 +16,13 @@ def near(error: float, margin: float) -> float:
     """Return dm_control's tolerance around 0: 1 at error 0, 0.1 at the margin (a Gaussian)."""
     scaled = error / margin
     return exp_scalar(-_LN_10 * scaled * scaled)
+
+
+@kernel
+def near_each(errors: Any, margin: float) -> None:
+    """Replace errors (n,) by their tolerance, see `near`. A loop of its own is vector code."""
+    for index in range(errors.shape[0]):
+        errors[index] = near(errors[index], margin)
 
 
 @kernel

@@ -145,9 +145,12 @@ class Rope(Task):
         self, x: np.ndarray, v: np.ndarray, action: np.ndarray, variables: Variables
     ) -> Judgement:
         """Judge by the distance of the free end from the goal."""
-        distance, reward = np.empty(len(x)), np.empty(len(x))
-        _judge(x, variables["goal"], self.reward_scale, distance, reward)
-        return Judgement(reward, distance < self.goal_radius, -distance, {"distance": distance})
+        count = len(x)
+        distance, reward, performance = np.empty(count), np.empty(count), np.empty(count)
+        reached = np.empty(count, dtype=bool)
+        limits = self.reward_scale, self.goal_radius
+        _judge(x, variables["goal"], *limits, distance, reward, performance, reached)
+        return Judgement(reward, reached, performance, {"distance": distance})
 
     def goal(self, variables: Variables, world: int) -> np.ndarray:
         """Only the free end has a goal."""
@@ -202,10 +205,21 @@ def _observe(
 
 
 @entry
-def _judge(x: Any, goal: Any, scale: float, distance: Any, reward: Any) -> None:
-    """Write the distances of n free ends from their goals (n,) [m], and the rewards (n,)."""
+def _judge(
+    x: Any,
+    goal: Any,
+    scale: float,
+    radius: float,
+    distance: Any,
+    reward: Any,
+    performance: Any,
+    reached: Any,
+) -> None:
+    """Judge n worlds by the distances of their free ends from their goals [m], (n,) each."""
     for world in range(x.shape[0]):
         across = np.float64(x[world, -1, 0] - goal[world, 0])
         along = np.float64(x[world, -1, 1] - goal[world, 1])
         distance[world] = np.sqrt(across * across + along * along)
         reward[world] = closeness(distance[world], scale)
+        performance[world] = -distance[world]
+        reached[world] = distance[world] < radius
