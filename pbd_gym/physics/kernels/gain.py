@@ -13,6 +13,7 @@ import numpy as np
 from ..compiling import kernel, row
 from .layout import DIM, LANES, POSITION, SQUARES, VELOCITY
 from .masses import inverse_mass_of, is_grabbed
+from .springs import released_by_springs
 from .tiles import lanes_used, world_of
 
 # Mean speed above which the books are kept [m/s]: for slow worlds it would cost more than it is
@@ -26,9 +27,9 @@ _GAIN = 0.05
 @kernel
 def take_out_gain(x, v, tile, worlds, work, model, timing):
     """Slow down the worlds of a tile that have gained energy; x and v are as the step began."""
-    if _stores_more(model.limits, model.rods, model.hinges, model.folds):
+    if _are_any(model.hinges, model.folds, model.volumes):
         return
-    if _stores_more(model.volumes, model.shape_matches, model.attachments, None):
+    if _are_any(model.shape_matches, model.attachments, None):
         return
     marks = row(work, work.shape[0] - 2)
     fast = x.dtype.type(x.shape[1] * _FAST * _FAST)
@@ -38,9 +39,8 @@ def take_out_gain(x, v, tile, worlds, work, model, timing):
 
 
 @kernel
-def _stores_more(first, second, third, fourth):
-    one_of_the_first = first is not None or second is not None
-    return one_of_the_first or third is not None or fourth is not None
+def _are_any(first, second, third):
+    return first is not None or second is not None or third is not None
 
 
 @kernel
@@ -69,10 +69,7 @@ def _balance(x, v, world, lane, work, model, timing):
             total += weight
             kinetic += half * weight * square
             gained += weight * risen
-    gained -= _released_by_chains(x, world, lane, work, masses, model.chains, timing)
-    gained -= _released_by_chains(x, world, lane, work, masses, model.ropes, timing)
-    gained -= _released_by_distances(x, world, lane, work, masses, model.distances, timing)
-    gained -= _released_by_bends(x, world, lane, work, masses, model.bends, timing)
+    gained -= released_by_springs(x, world, lane, work, model, timing)
     gained -= real(2) * np.sqrt(real(2) * drive * total * kinetic)
     if gained > real(_GAIN) * kinetic:
         _slow_down(lane, work, masses, gained, kinetic, zero if held else one / total)
@@ -108,70 +105,3 @@ def _momentum(lane, work, masses, k):
         if masses.inverse_mass[particle] > 0:
             momentum += work[particle, VELOCITY + k * LANES + lane] / masses.inverse_mass[particle]
     return momentum
-
-
-# A link that is too stiff for the substep to resolve its swing is as good as rigid, and its error
-# is none of the energy that went in.
-
-
-@kernel
-def _released_by_chains(x, world, lane, work, masses, chains, timing):
-    released = x.dtype.type(0)
-    if chains is None:
-        return released
-    for chain in range(chains.offsets.shape[0] - 1):
-        for entry in range(chains.offsets[chain], chains.offsets[chain + 1] - 1):
-            i, j = chains.particles[entry], chains.particles[entry + 1]
-            weights = masses.inverse_mass[i] + masses.inverse_mass[j]
-            rest, compliance = chains.rest[entry], chains.compliance[entry]
-            if compliance * timing.inverse_h2 >= weights:
-                released += _released(x, world, lane, work, i, j, rest, compliance)
-    return released
-
-
-@kernel
-def _released_by_distances(x, world, lane, work, masses, distances, timing):
-    released = x.dtype.type(0)
-    one = x.dtype.type(1)
-    for index in range(distances.rest.shape[0]):
-        i, j = distances.pairs[index, 0], distances.pairs[index, 1]
-        share, compliance = distances.stiffness[index], distances.compliance[index]
-        weights = masses.inverse_mass[i] + masses.inverse_mass[j]
-        if share < one:
-            # what the seed's stiffness is at this substep
-            compliance += weights * (one - share) / (share * timing.inverse_h2)
-        if share < one or compliance * timing.inverse_h2 >= weights:
-            released += _released(x, world, lane, work, i, j, distances.rest[index], compliance)
-    return released
-
-
-@kernel
-def _released(x, world, lane, work, i, j, rest, compliance):
-    """Return by how much the elastic energy of a link fell in the control step [J]."""
-    real = x.dtype.type
-    before, now = real(0), real(0)
-    for k in range(DIM):
-        at = POSITION + k * LANES + lane
-        before += (x[world, i, k] - x[world, j, k]) * (x[world, i, k] - x[world, j, k])
-        now += (work[i, at] - work[j, at]) * (work[i, at] - work[j, at])
-    before, now = np.sqrt(before) - rest, np.sqrt(now) - rest
-    return real(0.5) * (before * before - now * now) / compliance
-
-
-@kernel
-def _released_by_bends(x, world, lane, work, masses, bends, timing):
-    real = x.dtype.type
-    released, two = real(0), real(2)
-    for index in range(bends.triples.shape[0]):
-        a, b, c = bends.triples[index, 0], bends.triples[index, 1], bends.triples[index, 2]
-        weights = masses.inverse_mass[a] + real(4) * masses.inverse_mass[b] + masses.inverse_mass[c]
-        compliance = bends.compliance[index]
-        if compliance * timing.inverse_h2 >= weights:
-            square = real(0)
-            for k in range(DIM):
-                at = POSITION + k * LANES + lane
-                before = x[world, a, k] - two * x[world, b, k] + x[world, c, k]
-                now = work[a, at] - two * work[b, at] + work[c, at]
-                square += before * before - now * now
-            released += real(0.5) * square / compliance
-    return released
