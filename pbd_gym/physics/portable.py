@@ -52,14 +52,23 @@ def cos_sin(angle: Any) -> tuple[np.ndarray, np.ndarray]:
     Taylor polynomials of angle/4 (below 0.79 in size), then the double-angle formulas twice;
     absolute error below 1e-14.
     """
-    quarter = np.asarray(angle, dtype=np.float64) * 0.25
-    square = quarter * quarter
-    cosine = np.ones_like(quarter)
-    sine = np.ones_like(quarter)
-    for degree in range(18, 0, -2):
-        cosine = 1.0 - cosine * square * (1.0 / (degree * (degree - 1)))
-        sine = 1.0 - sine * square * (1.0 / (degree * (degree + 1)))
-    sine = sine * quarter
-    for _ in range(2):
-        cosine, sine = cosine * cosine - sine * sine, 2.0 * cosine * sine
+    values = np.asarray(angle, dtype=np.float64, order="C")
+    cosine, sine = np.empty(values.shape), np.empty(values.shape)
+    _cos_sin(values.reshape(-1), cosine.reshape(-1), sine.reshape(-1))
     return cosine, sine
+
+
+@entry
+def _cos_sin(angle: Any, cosine: Any, sine: Any) -> None:
+    """Write cosines and sines of angles (n,)."""
+    for index in range(angle.shape[0]):
+        quarter = angle[index] * 0.25
+        square = quarter * quarter
+        even = odd = 1.0
+        for degree in range(18, 0, -2):
+            even = 1.0 - even * square * (1.0 / (degree * (degree - 1)))
+            odd = 1.0 - odd * square * (1.0 / (degree * (degree + 1)))
+        odd *= quarter
+        for _ in range(2):
+            even, odd = even * even - odd * odd, 2.0 * even * odd
+        cosine[index], sine[index] = even, odd
