@@ -73,10 +73,16 @@ clean: ## remove .venv, caches and build files; results of training stay
 .venv/.installed-video: EXTRAS := [video]
 .venv/.installed-test: EXTRAS := [train,video,test]
 .venv/.installed-all: EXTRAS := [all]
-.venv/.installed-peers: EXTRAS := [peers]
 
 .venv/.installed-%: pyproject.toml constraints.txt | $(BIN)/pip
 	$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt -e ".$(EXTRAS)"
+	@touch $@
+
+# pyPBD brings pygame, which overwrites pygame-ce: it is put back.
+.venv/.installed-peers: pyproject.toml constraints.txt | $(BIN)/pip
+	$(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt -e ".[peers]"
+	$(BIN)/python -m pip uninstall -y pygame
+	$(BIN)/python -m pip install --force-reinstall --no-deps -c constraints.txt pygame-ce
 	@touch $@
 
 # pip is the last thing that venv writes, so a half-made .venv is not taken for a whole one.

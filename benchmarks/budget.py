@@ -8,10 +8,10 @@ wrappers. Watched and unwatched steps take turns. Episodes end at staggered time
 from __future__ import annotations
 
 import contextlib
+import statistics
 import sys
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -56,9 +56,9 @@ def parts_of(task: type[Task]) -> dict[str, list[tuple[type, str]]]:
 
 
 @contextlib.contextmanager
-def watched(task: type[Task]) -> Iterator[dict[str, float]]:
-    """Add up the seconds that each part takes within the context."""
-    spent: dict[str, float] = defaultdict(float)
+def watched(parts: Mapping[str, Sequence[tuple[type, str]]]) -> Iterator[dict[str, list[float]]]:
+    """Note the seconds of every call of the parts within the context."""
+    spent: dict[str, list[float]] = {part: [] for part in parts}
     inside = False
 
     def watch(method: Callable[..., Any], part: str) -> Callable[..., Any]:
@@ -70,43 +70,54 @@ def watched(task: type[Task]) -> Iterator[dict[str, float]]:
             try:
                 return method(*arguments, **keywords)
             finally:
-                spent[part] += time.thread_time() - begin
+                spent[part].append(time.thread_time() - begin)
                 inside = False
 
         return call
 
     with contextlib.ExitStack() as stack:
-        for part, methods in parts_of(task).items():
-            spent[part] = 0.0
+        for part, methods in parts.items():
             for kind, name in methods:
                 watcher = watch(getattr(kind, name), part)
                 stack.enter_context(mock.patch.object(kind, name, watcher))
         yield spent
 
 
+def cost_of_watching() -> float:
+    """Return what a watched call seems to take longer than it does [s]."""
+
+    class Nothing:
+        def do(self) -> None:
+            pass
+
+    nothing = Nothing()
+    with watched({"nothing": [(Nothing, "do")]}) as spent:
+        for _ in range(1000):
+            nothing.do()
+    return statistics.median(spent["nothing"])
+
+
 def measure(id: str, case: Case, rounds: int, seconds: float) -> list[Row]:
     """Measure the parts of one environment's step."""
     env: Any = gymnasium.make(id).unwrapped
-    spent: dict[str, float] = defaultdict(float)
-    steps = 0
+    parts, cost = parts_of(type(env.task)), cost_of_watching()
+    looks: dict[str, list[float]] = {part: [] for part in parts}
 
     def look(k: int) -> None:
-        nonlocal steps
-        with watched(type(env.task)) as seconds_of:
-            for part in range(_LOOKS):
-                case.step(k * _LOOKS + part)
-        steps += _LOOKS
-        for part, taken in seconds_of.items():
-            spent[part] += taken
+        with watched(parts) as spent:
+            for number in range(_LOOKS):
+                case.step(k * _LOOKS + number)
+        for part, calls in spent.items():
+            looks[part].append((sum(calls) - cost * len(calls)) / _LOOKS)
 
-    whole = in_turn({"step": case.step, "parts": look}, rounds, seconds, time.thread_time)[
-        "step"
-    ].median
-    parts = {part: taken / steps for part, taken in spent.items()}
-    parts["Python"] = max(whole - sum(parts.values()), 0.0)
+    whole = in_turn({"step": case.step, "": look}, rounds, seconds, time.thread_time)["step"].median
+    # episodes begin in some steps only: of resets the mean
+    taken = {part: statistics.median(looks[part]) for part in parts}
+    taken["reset"] = statistics.mean(looks["reset"])
+    taken["Python"] = max(whole - sum(taken.values()), 0.0)
     return [
-        Row(id, case.worlds, part, 1e6 * taken, taken / whole)
-        for part, taken in {"step": whole, **parts}.items()
+        Row(id, case.worlds, part, 1e6 * value, value / whole)
+        for part, value in {"step": whole, **taken}.items()
     ]
 
 

@@ -184,15 +184,16 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
             )
         going = ~self._ended
         outcome = self._batch.step(actions)
+        reward = outcome.reward
         self._pictures.advance(self._batch)
         if not going.all():  # NEXT_STEP: this step only begins those episodes
             self._begin(np.flatnonzero(~going), self._generators, {})
+            reward = np.where(going, reward, 0.0)
         self._elapsed += going
         terminated = outcome.terminated & going
         limit = self.max_episode_steps
         truncated = np.zeros(self.num_envs, dtype=bool) if limit is None else self._elapsed >= limit
         self._ended = terminated | truncated
-        reward = np.where(going, outcome.reward, 0.0)
         observation = self._batch.observe()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
             infos = self._begin_ended(observation, outcome.info)
@@ -264,7 +265,7 @@ def _infos(info: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
 def _masked(values: np.ndarray, shown: np.ndarray, hidden: np.ndarray) -> np.ndarray:
     """Return a copy of values that is 0 where hidden; writes the fewer of the two."""
     if len(shown) < len(hidden):
-        result = np.zeros_like(values)
+        result = np.zeros(values.shape, values.dtype)
         result[shown] = values[shown]
     else:
         result = values.copy()
