@@ -20,7 +20,7 @@ def released_by_springs(x, world, lane, work, model, timing):
     """
     masses, inverse_h2 = model.particles.inverse_mass, timing.inverse_h2
     before, after, lane = x[world], work, POSITION + lane
-    released = _of_chains(before, after, lane, masses, model.chains, inverse_h2)
+    released = _of_rows(before, after, lane, masses, model.chains, None, inverse_h2)
     released += _of_ropes(before, after, lane, masses, model.ropes, inverse_h2)
     released += _of_distances(before, after, lane, masses, model.distances, inverse_h2)
     released += _of_limits(before, after, lane, masses, model.limits, inverse_h2)
@@ -29,27 +29,23 @@ def released_by_springs(x, world, lane, work, model, timing):
 
 
 @kernel
-def _of_chains(before, after, first, masses, chains, inverse_h2):
-    released = inverse_h2 * 0
-    for chain in range(chains.offsets.shape[0] - 1):
-        for entry in range(chains.offsets[chain], chains.offsets[chain + 1] - 1):
-            i, j = chains.particles[entry], chains.particles[entry + 1]
-            rest, compliance = chains.rest[entry], chains.compliance[entry]
-            if compliance * inverse_h2 >= masses[i] + masses[j]:
-                released += _of_link(before, after, first, i, j, rest, rest, compliance)
-    return released
+def _of_ropes(before, after, first, masses, ropes, inverse_h2):
+    if ropes is None:
+        return inverse_h2 * 0
+    return _of_rows(before, after, first, masses, ropes, ropes.slack, inverse_h2)
 
 
 @kernel
-def _of_ropes(before, after, first, masses, ropes, inverse_h2):
+def _of_rows(before, after, first, masses, rows, slack, inverse_h2):
+    """Of chains or ropes; slack: which of them do not push, None if all do."""
     released = inverse_h2 * 0
-    if ropes is None:
-        return released
-    for rope in range(ropes.offsets.shape[0] - 1):
-        for entry in range(ropes.offsets[rope], ropes.offsets[rope + 1] - 1):
-            i, j = ropes.particles[entry], ropes.particles[entry + 1]
-            rest, compliance = ropes.rest[entry], ropes.compliance[entry]
-            least = released * 0 if ropes.slack[rope] else rest
+    for index in range(rows.offsets.shape[0] - 1):
+        for entry in range(rows.offsets[index], rows.offsets[index + 1] - 1):
+            i, j = rows.particles[entry], rows.particles[entry + 1]
+            rest, compliance = rows.rest[entry], rows.compliance[entry]
+            least = rest
+            if slack is not None:
+                least = rest if slack[index] == 0 else inverse_h2 * 0
             if compliance * inverse_h2 >= masses[i] + masses[j]:
                 released += _of_link(before, after, first, i, j, least, rest, compliance)
     return released
