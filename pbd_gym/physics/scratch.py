@@ -52,7 +52,7 @@ def _encounters(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, 
     if table is None:
         return None
     capacity = len(table.particles)
-    indices = np.zeros((lanes, capacity, 3), dtype=np.int32)
-    contacts = np.zeros((lanes * capacity, 2 + model.dim), dtype=dtype)
+    indices = np.zeros((lanes, capacity, 6), dtype=np.int32)
+    contacts = np.zeros((lanes * capacity, 4 + model.dim), dtype=dtype)
     scratch = np.zeros((2, lanes), dtype=dtype)
     return indices, np.zeros((2, lanes), dtype=np.int64), contacts, scratch

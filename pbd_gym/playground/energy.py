@@ -71,8 +71,8 @@ def style(integrator: str, shades: theme.Shades) -> tuple[str, Colour]:
 
 def _scale(values: Sequence[float]) -> tuple[float, float, float]:
     """Return least and greatest mark and their distance, so that all values lie between."""
-    finite = [value for value in values if np.isfinite(value)]
-    low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
+    finite = np.array(values)[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     # what is constant but for rounding is shown as constant
     span = max(high - low, 1e-3 * max(abs(low), abs(high)), 1e-6)
     power = 10.0 ** np.floor(np.log10(span))

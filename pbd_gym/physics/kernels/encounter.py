@@ -21,9 +21,12 @@ from .masses import in_lane, inverse_mass_of
 _PARTING_SPEED = 1.0
 # Share of g h^2 by which a sweep may still move what is settled.
 _STILL = 1e-3
-# Where the quantities of a contact stand in its row: sum of what it has pushed in the substep,
-# speed at which it may part, sum of its friction.
-PUSH, SPEED, RUB = 0, 1, 2
+# What is known of a contact stands together, or the sweeps would wait for the memory: in one row the
+# distance to keep, the friction, the sum of what it has pushed in the substep, the speed at which
+# it may part and the sum of its friction; in the other its encounter, its three particles and how
+# it touches. Of that other row the first number lists what can come about in the control step.
+DISTANCE, FRICTION, PUSH, SPEED, RUB = 0, 1, 2, 3, 4
+LISTED, ENCOUNTER, PARTICLE, FIRST, SECOND, TOUCH = 0, 1, 2, 3, 4, 5
 # How an encounter touches.
 _APART, _RESTS, _BOUNCES = 0, 1, 2
 
@@ -73,14 +76,19 @@ def _list_near(work, encounters, listed, timing, lane):
     travel = scratch[0, lane] * timing.h / timing.dt
     near = 0
     for entry in range(counts[0, lane]):
-        index = indices[lane, entry, 0]
-        c, a, b = _rows(work, encounters, index)
+        index = indices[lane, entry, LISTED]
+        particle, links = encounters.particles[index], encounters.links
+        c, a, b = row(work, particle), row(work, links[index, 0]), row(work, links[index, 1])
         reach = encounters.distance[index] + travel
         if _square(c, a, b, POSITION, _nearest(c, a, b, lane), lane) < reach * reach:
-            indices[lane, near, 1] = entry
-            indices[lane, entry, 2] = _APART
-            contact = row(contacts, lane * indices.shape[1] + entry)
-            for k in range(RUB + DIM):
+            indices[lane, near, ENCOUNTER] = index
+            indices[lane, near, PARTICLE] = particle
+            indices[lane, near, FIRST], indices[lane, near, SECOND] = links[index, 0], links[index, 1]
+            indices[lane, near, TOUCH] = _APART
+            contact = row(contacts, lane * indices.shape[1] + near)
+            contact[DISTANCE] = encounters.distance[index]
+            contact[FRICTION] = encounters.friction[index]
+            for k in range(PUSH, RUB + DIM):
                 contact[k] = travel * 0
             near += 1
     counts[1, lane] = near
@@ -98,28 +106,27 @@ def _sweep(work, masses, encounters, listed, timing, sweep, lane, forces):
     zero, parting = real(0), real(_PARTING_SPEED) * timing.h
     touches, greatest = False, zero
     for step in range(counts[1, lane]):
-        entry = indices[lane, step if sweep % 2 == 0 else counts[1, lane] - 1 - step, 1]
-        index = indices[lane, entry, 0]
-        contact = row(contacts, lane * indices.shape[1] + entry)
-        c, a, b = _rows(work, encounters, index)
+        near = step if sweep % 2 == 0 else counts[1, lane] - 1 - step
+        contact = row(contacts, lane * indices.shape[1] + near)
+        c, a, b = _rows(work, indices, lane, near)
         t = _nearest(c, a, b, lane)
-        distance = encounters.distance[index]
+        distance = contact[DISTANCE]
         square = _square(c, a, b, POSITION, t, lane)
         if contact[PUSH] == zero and square >= distance * distance:
             continue
-        weights = _weights(masses, encounters, index, c, a, b, t, lane)
+        weights = _weights(masses, indices, near, c, a, b, t, lane)
         if weights[3] > zero:
             before = _square(c, a, b, START, t, lane)
             target = distance
             if before < distance * distance:
                 target = min(distance, np.sqrt(before) + parting)
             depth = target - _measure(c, a, b, t, square, before, lane)
-            if indices[lane, entry, 2] == _APART:
-                touch, speed = _meet(c, a, b, lane, t, encounters, index, timing)
-                indices[lane, entry, 2], contact[SPEED] = touch, speed
-            friction = encounters.friction[index]
-            told = _told(forces, encounters, index, t)
-            move = _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told)
+            if indices[lane, near, TOUCH] == _APART:
+                restitution = encounters.restitution[indices[lane, near, ENCOUNTER]]
+                touch, speed = _meet(c, a, b, lane, t, restitution, timing)
+                indices[lane, near, TOUCH], contact[SPEED] = touch, speed
+            told = _told(forces, indices, lane, near, t)
+            move = _push_apart(c, a, b, lane, t, weights, depth, contact, told)
             touches, greatest = True, max(greatest, move)
     return touches, greatest
 
@@ -135,23 +142,21 @@ def part_from_others(work, masses, encounters, listed, h, forces):
         return
     indices, counts, contacts, _ = listed
     for lane in range(LANES):
-        for step in range(counts[1, lane]):
-            entry = indices[lane, step, 1]
-            touch = indices[lane, entry, 2]
+        for near in range(counts[1, lane]):
+            touch = indices[lane, near, TOUCH]
             if touch == _APART:
                 continue
-            index = indices[lane, entry, 0]
-            speed = row(contacts, lane * indices.shape[1] + entry)[SPEED]
-            c, a, b = _rows(work, encounters, index)
+            speed = row(contacts, lane * indices.shape[1] + near)[SPEED]
+            c, a, b = _rows(work, indices, lane, near)
             t = _nearest(c, a, b, lane)
-            weights = _weights(masses, encounters, index, c, a, b, t, lane)
+            weights = _weights(masses, indices, near, c, a, b, t, lane)
             square, before = _square(c, a, b, POSITION, t, lane), _square(c, a, b, START, t, lane)
             _measure(c, a, b, t, square, before, lane)
             parting = speed * 0
             for k in range(DIM):
                 parting += _normal(c, k, lane) * _apart(c, a, b, VELOCITY, t, k, lane)
             if weights[3] > 0 and (touch == _BOUNCES or parting > speed):
-                told, change = _told(forces, encounters, index, t), (speed - parting) / weights[3]
+                told, change = _told(forces, indices, lane, near, t), (speed - parting) / weights[3]
                 note_normal(told, lane, change * h)
                 for k in range(DIM):
                     change_k = change * _normal(c, k, lane)
@@ -160,20 +165,18 @@ def part_from_others(work, masses, encounters, listed, h, forces):
 
 
 @kernel
-def _rows(work, encounters, index):
+def _rows(work, indices, lane, near):
     """Return the rows of the particle and of the link's ends."""
-    links = encounters.links
-    c = row(work, encounters.particles[index])
-    return c, row(work, links[index, 0]), row(work, links[index, 1])
+    c = row(work, indices[lane, near, PARTICLE])
+    return c, row(work, indices[lane, near, FIRST]), row(work, indices[lane, near, SECOND])
 
 
 @kernel
-def _weights(masses, encounters, index, c, a, b, t, lane):
+def _weights(masses, indices, near, c, a, b, t, lane):
     """Return by how much an impulse along n moves the three, and how far it parts them."""
-    links = encounters.links
-    w_c = in_lane(inverse_mass_of(masses, encounters.particles[index]), c, lane)
-    w_a = in_lane(inverse_mass_of(masses, links[index, 0]), a, lane) * (1 - t)
-    w_b = in_lane(inverse_mass_of(masses, links[index, 1]), b, lane) * t
+    w_c = in_lane(inverse_mass_of(masses, indices[lane, near, PARTICLE]), c, lane)
+    w_a = in_lane(inverse_mass_of(masses, indices[lane, near, FIRST]), a, lane) * (1 - t)
+    w_b = in_lane(inverse_mass_of(masses, indices[lane, near, SECOND]), b, lane) * t
     return w_c, w_a, w_b, w_c + w_a * (1 - t) + w_b * t
 
 
@@ -248,9 +251,8 @@ def _motion(c, a, b, t, k, lane):
 
 
 @kernel
-def _meet(c, a, b, lane, t, encounters, index, timing):
+def _meet(c, a, b, lane, t, restitution, timing):
     """Return whether what meets bounces, and the speed at which it may part."""
-    restitution = encounters.restitution[index]
     approach, way = restitution * 0, restitution * 0
     for k in range(DIM):
         approach -= _normal(c, k, lane) * _apart(c, a, b, VELOCITY, t, k, lane)
@@ -261,7 +263,7 @@ def _meet(c, a, b, lane, t, encounters, index, timing):
 
 
 @kernel
-def _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told):
+def _push_apart(c, a, b, lane, t, weights, depth, contact, told):
     """Part a particle and a link by a depth [m]; return by how much they moved [m].
 
     The contact keeps the sums of its impulses in the substep. That of its pushes may not pull.
@@ -278,7 +280,7 @@ def _push_apart(c, a, b, lane, t, weights, depth, friction, contact, told):
     for k in range(DIM):
         rub = _rub(c, a, b, lane, t, inverse, way, contact, k)
         square += rub * rub
-    held = friction * push
+    held = contact[FRICTION] * push
     share = held / np.sqrt(square) if square > held * held else one
     note_normal(told, lane, push - contact[PUSH])
     for k in range(DIM):
@@ -308,10 +310,10 @@ def _move(c, a, b, at, weights, move):
 
 
 @kernel
-def _told(forces, encounters, index, t):
-    """Return where the forces of an encounter are noted, None if nobody asks."""
+def _told(forces, indices, lane, near, t):
+    """Return where the forces of a contact are noted, None if nobody asks."""
     if forces is None:
         return None
-    real, links = type(encounters.distance[index]), encounters.links
-    corners = encounters.particles[index], links[index, 0], links[index, 1]
+    real = type(t)
+    corners = indices[lane, near, PARTICLE], indices[lane, near, FIRST], indices[lane, near, SECOND]
     return forces, ENCOUNTERS, corners, (real(1), real(t - 1), real(-t))

@@ -13,9 +13,9 @@ _SPEED_UP = 2.0
 def list_encounters(work, encounters, listed, timing):
     """List, for every lane, the encounters that can come about within the control step.
 
-    listed: their indices, which of them are near in a substep and how they touch (LANES, capacity,
-    3), the numbers of what is listed and near (2, LANES), what a contact pushes (LANES * capacity,
-    2 + DIM), and scratch (2, LANES): by how much two things can approach. All have room in the
+    listed: their indices, and what is near in a substep (LANES, capacity, 6), the numbers of what
+    is listed and near (2, LANES), what a contact pushes (LANES * capacity, 4 + DIM), see
+    `encounter`, and scratch (2, LANES): by how much two things can approach. All have room in the
     lists.
     """
     if encounters is None:

@@ -151,13 +151,20 @@ def draw_discs(picture: Any, centres: Any, radii: Any, colours: Any) -> None:
     height, width = picture.shape[:2]
     for k in range(len(centres)):
         x, y, r = centres[k, 0], centres[k, 1], radii[k]
-        for row in range(max(floor(y - r - 0.5), 0), min(ceil(y + r + 0.5), height)):
-            for column in range(max(floor(x - r - 0.5), 0), min(ceil(x + r + 0.5), width)):
+        inside, outside = max(r - 0.5, 0.0), r + 0.5
+        whole = int(colours[k, 0] + 0.5), int(colours[k, 1] + 0.5), int(colours[k, 2] + 0.5)
+        for row in range(max(floor(y - outside), 0), min(ceil(y + outside), height)):
+            for column in range(max(floor(x - outside), 0), min(ceil(x + outside), width)):
                 dx, dy = column + 0.5 - x, row + 0.5 - y
-                distance = sqrt(dx * dx + dy * dy)
-                share = max(min(distance + r, 0.5) - max(distance - r, -0.5), 0.0)
-                for channel in range(3):
-                    old = float(picture[row, column, channel])
-                    picture[row, column, channel] = int(
-                        old + (colours[k, channel] - old) * share + 0.5
-                    )
+                square = dx * dx + dy * dy
+                if square < inside * inside:  # most pixels: no root, nothing to mix
+                    for channel in range(3):
+                        picture[row, column, channel] = whole[channel]
+                elif square < outside * outside:
+                    distance = sqrt(square)
+                    share = max(min(distance + r, 0.5) - max(distance - r, -0.5), 0.0)
+                    for channel in range(3):
+                        old = float(picture[row, column, channel])
+                        picture[row, column, channel] = int(
+                            old + (colours[k, channel] - old) * share + 0.5
+                        )
