@@ -21,7 +21,7 @@ from .masses import in_lane, inverse_mass_of
 _PARTING_SPEED = 1.0
 # Share of g h^2 by which a sweep may still move what is settled.
 _STILL = 1e-3
-# What is known of a contact stands together, or the sweeps would wait for the memory: in one row the
+# What is known of a contact stands together, or sweeps would wait for the memory: in one row the
 # distance to keep, the friction, the sum of what it has pushed in the substep, the speed at which
 # it may part and the sum of its friction; in the other its encounter, its three particles and how
 # it touches. Of that other row the first number lists what can come about in the control step.
@@ -83,7 +83,8 @@ def _list_near(work, encounters, listed, timing, lane):
         if _square(c, a, b, POSITION, _nearest(c, a, b, lane), lane) < reach * reach:
             indices[lane, near, ENCOUNTER] = index
             indices[lane, near, PARTICLE] = particle
-            indices[lane, near, FIRST], indices[lane, near, SECOND] = links[index, 0], links[index, 1]
+            indices[lane, near, FIRST] = links[index, 0]
+            indices[lane, near, SECOND] = links[index, 1]
             indices[lane, near, TOUCH] = _APART
             contact = row(contacts, lane * indices.shape[1] + near)
             contact[DISTANCE] = encounters.distance[index]
