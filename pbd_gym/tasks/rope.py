@@ -220,6 +220,7 @@ def _judge(
         across = np.float64(x[world, -1, 0] - goal[world, 0])
         along = np.float64(x[world, -1, 1] - goal[world, 1])
         distance[world] = np.sqrt(across * across + along * along)
+    for world in range(x.shape[0]):  # a loop of its own is vector code
         reward[world] = closeness(distance[world], scale)
         performance[world] = -distance[world]
         reached[world] = distance[world] < radius
