@@ -28,7 +28,7 @@ def clip_actions(actions: Any, clipped: Any, excess: Any) -> bool:
             clipped[world, index] = within
             most = max(most, abs(action - within))
         excess[world] = most
-    return finite
+    return bool(finite)
 
 
 @entry
