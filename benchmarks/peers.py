@@ -29,8 +29,8 @@ from peer_pendulums import double_pendulums, lone_pendulums, single_pendulums
 from records import benchmark_parser, draw, in_turn, table, write
 
 _MODULES = {
-    "MuJoCo": "mujoco", "pyPBD": "pypbd", "pymunk": "pymunk", "newton": "newton",
-    "gymnax": "gymnax", "EnvPool": "envpool", "gymnasium[mujoco]": "imageio",
+    "MuJoCo": ("mujoco",), "pyPBD": ("pypbd",), "pymunk": ("pymunk",), "newton": ("newton",),
+    "gymnax": ("gymnax",), "EnvPool": ("envpool",), "gymnasium[mujoco]": ("mujoco", "imageio"),
 }  # fmt: skip
 _THREADS = 2
 SCENES: dict[str, Callable[[], Iterator[Contender]]] = {
@@ -143,7 +143,7 @@ def installed(contenders: Sequence[Contender]) -> list[Contender]:
     missing = {
         one.engine
         for one in contenders
-        if one.engine in _MODULES and importlib.util.find_spec(_MODULES[one.engine]) is None
+        if not all(map(importlib.util.find_spec, _MODULES.get(one.engine, ())))
     }
     for engine in sorted(missing):
         print(f"{engine} is left out: pip install {engine.lower()}", file=sys.stderr)

@@ -48,7 +48,7 @@ def test_a_quick_run_of_sb3_frames_compares_all_ways_to_step(tmp_path):
         rows = list(csv.DictReader(file))
     ways = {"pbd_gym.sb3", "nothing", "DummyVecEnv", "SubprocVecEnv"}
     assert {row["worlds"] for row in rows} == ways
-    assert all(float(row["collecting"]) > float(row["training"]) > 0.0 for row in rows)
+    assert all(float(row[name]) > 0.0 for row in rows for name in ("collecting", "training"))
 
 
 def test_the_shares_of_a_step_add_up_to_the_whole(tmp_path):

@@ -88,8 +88,8 @@ def _of_bends(before, after, first, masses, bends, inverse_h2):
         a, b, c = bends.triples[index, 0], bends.triples[index, 1], bends.triples[index, 2]
         compliance = bends.compliance[index]
         if _swings(masses, a, b, c, compliance * inverse_h2):
-            was = _bend(before, a, b, c, 0, 1, False)
-            released += _fall(was, _bend(after, a, b, c, first, LANES, False), compliance)
+            was = _deflection(before, a, b, c, 0, 1, False)
+            released += _fall(was, _deflection(after, a, b, c, first, LANES, False), compliance)
     return released
 
 
@@ -104,8 +104,8 @@ def _of_rods(before, after, first, masses, rods, inverse_h2):
             a, b, c = rods.particles[entry - 1], rods.particles[entry], rods.particles[entry + 1]
             rest, compliance = rods.rest[entry], rods.compliance[entry]
             if _swings(masses, a, b, c, compliance * inverse_h2):
-                was = _bend(before, a, b, c, 0, 1, is_curved) - rest
-                now = _bend(after, a, b, c, first, LANES, is_curved) - rest
+                was = _deflection(before, a, b, c, 0, 1, is_curved) - rest
+                now = _deflection(after, a, b, c, first, LANES, is_curved) - rest
                 released += _fall(was, now, compliance)
     return released
 
@@ -145,7 +145,7 @@ def _length(points, i, j, first, step):
 
 
 @kernel
-def _bend(points, a, b, c, first, step, is_signed):
+def _deflection(points, a, b, c, first, step, is_signed):
     """Return |x_a - 2 x_b + x_c|; in 2D, where asked, negative where the joint turns right."""
     square = points[a, first] * 0
     left, two = square, type(square)(2)
