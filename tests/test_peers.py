@@ -31,7 +31,7 @@ def test_a_quick_run_prints_a_table_and_writes_all_files(tmp_path, capsys):
 
 
 def test_a_package_that_is_missing_is_left_out_and_named(monkeypatch, capsys):
-    monkeypatch.setitem(peers._MODULES, "EnvPool", "no_such_module")
+    monkeypatch.setitem(peers._MODULES, "EnvPool", ("no_such_module",))
     contenders = [Contender(name, "", 1, 1, Motion) for name in ("pbd_gym", "EnvPool")]
     assert peers.installed(contenders) == contenders[:1]
     assert capsys.readouterr().err == "EnvPool is left out: pip install envpool\n"
