@@ -29,7 +29,7 @@ lint: .venv/.installed-all ## check style, formatting, types, imports and spelli
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 
-bench: throughput budget roofline scaling peers ## measure all that the next five do, in 10 minutes
+bench: throughput budget roofline scaling peers ## measure all that the next five do
 
 throughput: .venv/.installed-core ## measure control steps per second
 	$(BIN)/python benchmarks/throughput.py $(ARGS)
