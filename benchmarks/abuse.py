@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from abuse_models import FAMILIES, Family
-from machine import describe_machine
 from tqdm import tqdm
 
+from abuse_models import FAMILIES, Family
+from machine import describe_machine
 from pbd_gym.physics import Model, World, readouts
 
 DT, SUBSTEPS, WORLDS = 1 / 60, 8, 32

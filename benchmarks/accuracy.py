@@ -22,12 +22,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from tqdm import tqdm
+
 from accuracy_cloth import CLOTH_ENGINES, FRAMES
 from accuracy_engines import ENGINES, Entry, is_installed
 from accuracy_figure import draw_figure
 from accuracy_scenes import SCENES, ChainScene
 from machine import describe_machine
-from tqdm import tqdm
 
 RESULTS = Path(__file__).parent / "results"
 CLOTH = "hanging cloth"

@@ -12,10 +12,10 @@ from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
+
 from accuracy_engines import fresh_simulation, peer
 from accuracy_scenes import FRAME, GRAVITY, ramp
 from driven import MASS, driven_cloth
-
 from pbd_gym.physics import World
 
 SIZE = 16

@@ -15,8 +15,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from accuracy_scenes import FRAME, GRAVITY, ChainScene
 
+from accuracy_scenes import FRAME, GRAVITY, ChainScene
 from pbd_gym.physics import ModelBuilder, World
 
 Run = Callable[[], tuple[np.ndarray, float]]

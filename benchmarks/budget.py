@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 import gymnasium
-from records import benchmark_parser, in_turn, table, write
-from throughput import Case, single_case, task_ids, vector_case
 
 from pbd_gym.physics import World
 from pbd_gym.tasks import Batch, Task
+from records import benchmark_parser, in_turn, table, write
+from throughput import Case, single_case, task_ids, vector_case
 
 _BATCH = 4096
 _LOOKS = 8  # steps between putting the watches on and off

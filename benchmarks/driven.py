@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from accuracy_scenes import FRAME, GRAVITY, ramp
 
+from accuracy_scenes import FRAME, GRAVITY, ramp
 from pbd_gym.physics import Model, ModelBuilder, shapes
 
 MASS = 0.2

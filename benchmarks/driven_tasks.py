@@ -12,9 +12,9 @@ from functools import cached_property
 
 import gymnasium
 import numpy as np
-from driven import Driven, driven_cloth, driven_rope
 
 import pbd_gym
+from driven import Driven, driven_cloth, driven_rope
 from pbd_gym.physics import Model
 from pbd_gym.tasks.base import Draw, draw, number
 from pbd_gym.tasks.cloth import Cloth

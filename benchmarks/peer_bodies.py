@@ -13,12 +13,13 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode
+
 from accuracy_cloth import mujoco_cloth, pypbd_cloth
 from accuracy_engines import mujoco_chain, peer, pymunk_chain, pypbd_chain
 from accuracy_scenes import FRAME, SCENES
 from driven import driven_cloth
 from driven_tasks import FRAMES, DrivenCloth, DrivenRope
-from gymnasium.vector import AutoresetMode
 from motions import Contender, Motion, frame
 from peer_newton import newton_rope
 

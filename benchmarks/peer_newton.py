@@ -6,6 +6,7 @@ import importlib
 from typing import Any
 
 import numpy as np
+
 from accuracy_scenes import FRAME, GRAVITY, SCENES, ChainScene
 from driven_tasks import FRAMES
 from motions import Motion, frame

@@ -16,6 +16,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+
 from motions import Contender, Motion
 from throughput import single_case, vector_case
 

@@ -21,6 +21,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+
 from accuracy_cloth import worst_strain
 from motions import FRAMES, Contender, Motion
 from peer_bodies import ROPE, cloths, ropes, single_ropes

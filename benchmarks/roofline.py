@@ -15,12 +15,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+
 from accuracy_scenes import FRAME
 from driven import Driven, driven_cloth, driven_rope
 from native import COMPILER, FLAGS, NativeWorld, compiler_version, has_compiler
-from records import benchmark_parser, in_turn, table, write
-
 from pbd_gym.physics import World
+from records import benchmark_parser, in_turn, table, write
 
 _C_LANES = (8, 16, 32, 64)
 _FRAMES = 60

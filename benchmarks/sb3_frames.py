@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 import torch
-from records import RESULTS, in_turn, table, write
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
 from tqdm import tqdm
 
 from pbd_gym.hyperparams import algorithm_arguments, load_hyperparameters
 from pbd_gym.sb3 import make_sb3_vec_env
+from records import RESULTS, in_turn, table, write
 
 _IDS = ("PBDPendulum-v0", "PBDRope-v0", "PBDCloth-v0")
 

@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 from accuracy_scenes import FRAME
 from driven import Driven, driven_cloth, driven_rope
-from records import benchmark_parser, draw, in_turn, table, write
-
 from pbd_gym.physics import World
+from records import benchmark_parser, draw, in_turn, table, write
 
 _ROPES = (8, 16, 32, 64, 128, 256, 512, 1024)
 _CLOTHS = (4, 6, 8, 12, 16, 24, 32)

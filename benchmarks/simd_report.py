@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from numba.core.dispatcher import Dispatcher
+
 from records import table
 
 _ARITHMETIC = r"\tv?(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)"
@@ -49,7 +50,6 @@ def measure(scene: str, lanes: int | None = None) -> list[Row]:
     """Compile the kernels for a scene; return those that calculate."""
     # kernels that were loaded from disk cannot be read: `main` has taken an empty folder first
     from driven import driven_cloth, driven_rope
-
     from pbd_gym.physics import World
     from pbd_gym.physics.compiling import load_kernels
 

@@ -20,13 +20,13 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
+
+import pbd_gym
 from machine import describe_machine
+from pbd_gym.physics import World
 from records import benchmark_parser, draw
 from report import draw_figure, markdown
 from start_up import measure_start_up
-
-import pbd_gym
-from pbd_gym.physics import World
 
 gymnasium.register_envs(pbd_gym)
 WORLDS = (1, 64, 1024, 4096)

@@ -7,9 +7,10 @@ import warnings
 import gymnasium
 import numpy as np
 import pytest
-from episodes import IDS, VARIANTS, episode, make, make_vec, nothing, parts, play, random_actions
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import AddRenderObservation, RecordVideo
+
+from episodes import IDS, VARIANTS, episode, make, make_vec, nothing, parts, play, random_actions
 
 
 def starts_and_steps(env, starts=4, steps=60):

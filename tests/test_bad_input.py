@@ -3,6 +3,7 @@
 import gymnasium
 import numpy as np
 import pytest
+
 from episodes import (
     IDS,
     VARIANTS,

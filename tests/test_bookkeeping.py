@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from episodes import make, make_vec, nothing
 
+from episodes import make, make_vec, nothing
 from pbd_gym.tasks.bookkeeping import clip_actions, clip_observations, find_diverged, keep_score
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from drawn import SPACE, every_scene
 
+from drawn import SPACE, every_scene
 from pbd_gym.rendering import Renderer
 from pbd_gym.rendering.camera import OrthographicCamera, PerspectiveCamera
 from pbd_gym.rendering.curves import smooth_line, smooth_sheet

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+import pbd_gym
 from episodes import (
     IDS,
     VARIANTS,
@@ -21,8 +23,6 @@ from episodes import (
     play,
     random_actions,
 )
-
-import pbd_gym
 
 # What numpy may choose at run time on some processor; those that this one lacks are left out, as
 # numpy warns of them. Names of numpy >= 2.4 first, then of those before it.

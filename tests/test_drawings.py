@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawings import hanging_rope
 
+from drawings import hanging_rope
 from pbd_gym.physics import ModelBuilder
 from pbd_gym.playground.__main__ import main
 from pbd_gym.playground.building import build_model

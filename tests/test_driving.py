@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from episodes import IDS, flat, make, make_vec, pins, play
 
 # float32 positions of about 1 m are exact to 6e-8 m, which over a control step of 20 ms is

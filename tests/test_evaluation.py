@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from countdown import Countdown
 
 pytest.importorskip("stable_baselines3")
@@ -13,9 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
 
 import evaluate
 from intervals import bootstrap_mean, wilson_rate
-from rollouts import run_episodes
-
 from pbd_gym.planning import SETTINGS
+from rollouts import run_episodes
 
 
 def test_the_scripted_policy_is_measured_above_noop_and_random(tmp_path):

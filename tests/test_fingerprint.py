@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from episodes import IDS, VARIANTS
 
 import pbd_gym
+from episodes import IDS, VARIANTS
 from pbd_gym.fingerprint import KINDS, RELEASED, fingerprint, hash_environment, hash_physics, main
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from drawn import changed
 
 import pbd_gym  # noqa: F401
+from drawn import changed
 
 ROOT = Path(__file__).parents[1]
 IDS = [id for id in gymnasium.registry if id.startswith("PBD")]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from episodes import assert_same, make, make_vec, play, random_actions
 
 TWINS = {"PBDRopeGoal-v0": "PBDRope-v0", "PBDClothGoal-v0": "PBDCloth-v0"}

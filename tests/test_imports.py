@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from episodes import VARIANTS
 
 import pbd_gym
+from episodes import VARIANTS
 
 HEAVY = ("numba", "pygame", "torch", "stable_baselines3", "matplotlib", "imageio_ffmpeg")
 # Seconds that a user waits from `python` to the first step, with kernels in the cache.

@@ -1,8 +1,8 @@
 import gymnasium
 import numpy as np
 import pytest
-from drawn import CLOTH, PLANE, SPACE, as_ints, changed, cloth, every_scene, no_goal, pendulum, rope
 
+from drawn import CLOTH, PLANE, SPACE, as_ints, changed, cloth, every_scene, no_goal, pendulum, rope
 from pbd_gym.physics import ModelBuilder, shapes
 from pbd_gym.rendering import Renderer, Viewpoint
 from pbd_gym.rendering.scene import loose_links, payload_radius, tips

@@ -5,8 +5,9 @@ import multiprocessing
 import gymnasium
 import numpy as np
 import pytest
-from episodes import VARIANTS, assert_same, episode, make, make_sync, make_vec, play, random_actions
 from gymnasium.vector import AsyncVectorEnv
+
+from episodes import VARIANTS, assert_same, episode, make, make_sync, make_vec, play, random_actions
 
 STEPS = 5
 START_METHODS = sorted(

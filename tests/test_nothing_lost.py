@@ -16,14 +16,14 @@ import pytest
 pytest.importorskip("stable_baselines3")
 sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
 
+from stable_baselines3 import PPO, SAC
+
 import evaluate
+import train
 from callbacks import ProgressBar
 from checkpoint import load_checkpoint
 from config import load_config
 from files import write_atomically
-from stable_baselines3 import PPO, SAC
-
-import train
 from runs import SCRIPT, assert_same_run, interrupt_after, small_run
 
 

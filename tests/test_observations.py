@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from episodes import make_vec, play, random_actions
 
 WORLDS = 5

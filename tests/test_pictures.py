@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from drawn import (
     CLOTH,
     PLANE,
@@ -15,7 +16,6 @@ from drawn import (
     shapes_2d,
     shapes_3d,
 )
-
 from pbd_gym.physics import Linkage, ModelBuilder
 from pbd_gym.rendering import Renderer
 from pbd_gym.rendering.scene import bob_radius

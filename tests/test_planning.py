@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from episodes import IDS, assert_same, make, make_vec, play, random_actions
 
+from episodes import IDS, assert_same, make, make_vec, play, random_actions
 from pbd_gym.planning import METHODS, SETTINGS, Planner, PlannerSettings, planner_settings
 
 SMALL = PlannerSettings(

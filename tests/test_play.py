@@ -7,8 +7,8 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from display import DRIVERS, choose_display, hand_on
 
+from display import DRIVERS, choose_display, hand_on
 from pbd_gym.play import Play, load_agent, main
 
 EXAMPLE = Path(__file__).parents[1] / "examples/record_video.py"

@@ -3,9 +3,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from display import DRIVERS, choose_display, hand_on
 from drawings import hanging_rope
-
 from pbd_gym.playground.files import at_rest, load_scene
 from pbd_gym.playground.scenes import SCENES
 

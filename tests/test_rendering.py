@@ -5,8 +5,8 @@ import sys
 
 import numpy as np
 import pytest
-from drawn import PLANE, changed, every_scene, no_goal, rope
 
+from drawn import PLANE, changed, every_scene, no_goal, rope
 from pbd_gym.rendering import Renderer
 
 

@@ -5,8 +5,9 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
-from countdown import Countdown
 from gymnasium.vector import AutoresetMode
+
+from countdown import Countdown
 
 pytest.importorskip("stable_baselines3")
 

@@ -5,6 +5,8 @@ import pickle
 
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
+
 from episodes import (
     IDS,
     MODES,
@@ -17,7 +19,6 @@ from episodes import (
     play,
     random_actions,
 )
-from gymnasium.vector import AutoresetMode
 
 
 @pytest.mark.parametrize("id", IDS)

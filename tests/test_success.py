@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+
 from episodes import IDS, VARIANTS, make, make_vec, nothing, outcomes, play
 
 

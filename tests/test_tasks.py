@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from episodes import IDS, flat, make, make_vec, nothing, outcomes, parts, pins
 
 

@@ -9,9 +9,9 @@ import yaml
 pytest.importorskip("stable_baselines3")
 sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
 
-import evaluate
 import torch
 
+import evaluate
 import pbd_gym
 import train
 from pbd_gym.hyperparams import ALGORITHMS, algorithm_arguments, load_hyperparameters

@@ -4,6 +4,9 @@ import copy
 
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
 from episodes import (
     IDS,
     MODES,
@@ -16,8 +19,6 @@ from episodes import (
     play,
     random_actions,
 )
-from gymnasium.vector import AutoresetMode
-from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 # worlds of this rope end apart by termination, and together by truncation where they last
 FRAGILE = {"task": FragileRope, "max_episode_steps": 9}

@@ -21,11 +21,10 @@ from arguments import HelpFormatter
 from curve_figures import draw_curves
 from curves import Point, read_csv
 from files import write_atomically
+from pbd_gym.hyperparams import ALGORITHMS
 from policies import BASELINES
 from run_directory import RunDirectory
 from scores import Score, overall_table, read_scores, table, write_scores
-
-from pbd_gym.hyperparams import ALGORITHMS
 
 ENVIRONMENTS = (
     "PBDPendulum-v0",

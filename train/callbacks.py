@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
+from tqdm import tqdm
+
 from checkpoint import save_checkpoint, save_model
 from curves import LearningCurve, Point
 from files import check_room
 from interrupt import InterruptRequest
-from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
-from tqdm import tqdm
 
 
 def recent_episodes(model: BaseAlgorithm) -> tuple[float, float]:

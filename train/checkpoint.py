@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from files import write_atomically
 from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from files import write_atomically
 from pbd_gym.hyperparams import algorithm_class
 from pbd_gym.sb3 import SB3VecEnv
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import gymnasium
 import yaml
-from files import write_atomically
 
+from files import write_atomically
 from pbd_gym.hyperparams import SETUP, check_hyperparameters, load_hyperparameters
 
 DEFAULT_ENV = "pbd_gym:PBDRope-v0"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from curves import Point
 from files import write_atomically
 from scores import Score

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import gymnasium
+
 from arguments import HelpFormatter, StoreKeyValues
 from config import DEFAULT_ENV, load_config
 from policies import make_policy

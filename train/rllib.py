@@ -24,13 +24,13 @@ from typing import Any
 
 import gymnasium
 import yaml
+
 from arguments import StoreKeyValues, sparse_parser
 from config import DEFAULT_ENV, check_at_least, check_registered
 from files import write_atomically
 from interrupt import InterruptRequest
-from run_directory import RunDirectory
-
 from pbd_gym.hyperparams import load_hyperparameters
+from run_directory import RunDirectory
 
 EXAMPLES = """\
 examples:

@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
+
 from intervals import Estimate, bootstrap_mean, wilson_rate
 from policies import Policy
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
+
 from arguments import StoreKeyValues, sparse_parser
 from config import (
     DEFAULT_ENV,
@@ -23,12 +24,11 @@ from config import (
     new_config,
     save_config,
 )
+from pbd_gym.hyperparams import ALGORITHMS
 from policies import make_policy
 from rollouts import make_batch, report, run_episodes
 from run_directory import RunDirectory
 from video import check_video, record_video
-
-from pbd_gym.hyperparams import ALGORITHMS
 
 if TYPE_CHECKING:  # torch takes seconds to import, which --help and wrong options need not wait for
     from training import Training

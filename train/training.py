@@ -6,6 +6,10 @@ from typing import Any
 
 import numpy as np
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import EvalCallback
+from stable_baselines3.common.logger import configure
+
 from callbacks import (
     BestModelSaver,
     Checkpointer,
@@ -17,13 +21,9 @@ from checkpoint import restore_model
 from config import TrainingConfig
 from curves import LearningCurve, plot_learning_curve, write_csv
 from interrupt import InterruptRequest
-from run_directory import RunDirectory
-from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import EvalCallback
-from stable_baselines3.common.logger import configure
-
 from pbd_gym.hyperparams import algorithm_arguments, algorithm_class
 from pbd_gym.sb3 import make_sb3_vec_env
+from run_directory import RunDirectory
 
 # What an EvalCallback must remember for a resumed training to evaluate and choose alike.
 _EVALUATION_ATTRIBUTES = (

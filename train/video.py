@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pbd_gym.rendering import VideoWriter, grid
 from policies import make_policy
 from rollouts import make_batch
-
-from pbd_gym.rendering import VideoWriter, grid
 
 WORLDS, COLUMNS = 6, 3
 LEAST_SECONDS = 6.0

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import world
 
 from pbd_gym.physics import Adaptive, ModelBuilder, World, shapes
+from scenes import world
 
 DT = 0.02
 SUBSTEPS = Adaptive(reach=0.01, least=2, most=16)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import GRAVITY, momenta, pendulum_2d, rope_2d, strain, turn, world
 
 from pbd_gym.physics import ModelBuilder
+from scenes import GRAVITY, momenta, pendulum_2d, rope_2d, strain, turn, world
 
 
 def test_a_hanging_chain_keeps_its_length():

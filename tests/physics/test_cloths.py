@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import cloth_3d, momenta, strain, world
 
 from pbd_gym.physics import ModelBuilder, shapes
+from scenes import cloth_3d, momenta, strain, world
 
 
 def closest(state):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import GRAVITY, world
 
 from pbd_gym.physics import ModelBuilder
+from scenes import GRAVITY, world
 
 H = 1e-3  # substep [s]
 PARTING = 1.0  # speed at which particles are let out of shapes [m/s]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from refusals import line, refused
 
 NAN, INF = np.nan, np.inf

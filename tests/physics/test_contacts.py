@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from scenes import GRAVITY, particles_2d, rope_2d, world
 
 ABOVE = ([-np.inf, 0.0], [np.inf, np.inf])

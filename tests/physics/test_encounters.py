@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import GRAVITY, momenta, world
 
 from pbd_gym.physics import ModelBuilder, World, readouts, shapes
+from scenes import GRAVITY, momenta, world
 
 RADIUS = 0.05
 FLOATING = (0.0, 0.0)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from scenes import GRAVITY, particles_2d, world
 
 START = np.array([0.3, 2.0])

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import GRAVITY, momenta, world
 
 from pbd_gym.physics import ModelBuilder, shapes
+from scenes import GRAVITY, momenta, world
 
 STIFFNESS = 2e-3  # B [N m]
 

@@ -8,9 +8,9 @@ import functools
 
 import numpy as np
 import pytest
-from scenes import GRAVITY
 
 from pbd_gym.physics import ModelBuilder, World, readouts
+from scenes import GRAVITY
 
 DT, SUBSTEPS = 1 / 60, 10
 H = DT / SUBSTEPS

@@ -6,9 +6,9 @@ All tests share one set of kinds and two lanes, as those of the plane do.
 import functools
 
 import numpy as np
-from scenes import GRAVITY
 
 from pbd_gym.physics import ModelBuilder, World, readouts, shapes
+from scenes import GRAVITY
 
 DT, SUBSTEPS = 1 / 60, 10
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import GRAVITY, momenta, world
 
 from pbd_gym.physics import ModelBuilder, frame_targets, shapes
+from scenes import GRAVITY, momenta, world
 
 
 @pytest.mark.parametrize("dim", [2, 3])

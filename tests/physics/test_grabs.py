@@ -4,9 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
-from scenes import GRAVITY, momenta, world
 
 from pbd_gym.physics import Adaptive, ModelBuilder, Snapshot, World, shapes
+from scenes import GRAVITY, momenta, world
 
 DT, SUBSTEPS = 1 / 60, 10
 

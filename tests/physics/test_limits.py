@@ -2,9 +2,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import GRAVITY, world
 
 from pbd_gym.physics import ModelBuilder, shapes
+from scenes import GRAVITY, world
 
 
 def hung(mass=1.0, **properties):

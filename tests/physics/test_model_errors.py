@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from refusals import line, refused
 
 from pbd_gym.physics import ModelBuilder, shapes
+from refusals import line, refused
 
 NAN, INF = np.nan, np.inf
 

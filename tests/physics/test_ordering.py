@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import GRAVITY, world
 
 from pbd_gym.physics import ModelBuilder
+from scenes import GRAVITY, world
 
 LINKS, MASS = 10, 0.01
 

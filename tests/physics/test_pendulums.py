@@ -2,12 +2,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scenes import GRAVITY, energy, pendulum_2d, turn, world
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from pbd_gym.physics import World
 from pbd_gym.tasks.pendulum import Pendulum
+from scenes import GRAVITY, energy, pendulum_2d, turn, world
 
 # the settings of the pendulum environments
 DT, SUBSTEPS, ITERATIONS = 0.02, 10, 2

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from scenes import rope_2d, world
 
 

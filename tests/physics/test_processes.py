@@ -10,9 +10,9 @@ from threading import Barrier
 
 import numpy as np
 import pytest
-from scenes import cloth_3d, rope_2d, world
 
 from pbd_gym.physics.compiling import load_kernels
+from scenes import cloth_3d, rope_2d, world
 
 
 def moving(num_threads=2):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import GRAVITY, cloth_3d, particles_2d, rope_2d, world
 
 from pbd_gym.physics import ModelBuilder, World, readouts, shapes
+from scenes import GRAVITY, cloth_3d, particles_2d, rope_2d, world
 
 DT, SUBSTEPS = 1 / 60, 10
 H = DT / SUBSTEPS

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import momenta, strain, world
 
 from pbd_gym.physics import ModelBuilder, shapes
+from scenes import momenta, strain, world
 
 
 def beam(links, *, dim=2, stiffness=0.1, weight=1e-4, **settings):

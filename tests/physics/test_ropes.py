@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from scenes import GRAVITY, momenta, rope_2d, strain, world
 from scipy.optimize import brentq
 from scipy.special import j0
 
 from pbd_gym.physics import ModelBuilder, shapes
+from scenes import GRAVITY, momenta, rope_2d, strain, world
 
 
 def driven(particles, *, seconds=10.0, implicit=True, slack=False, payload=0.0):

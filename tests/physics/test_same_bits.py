@@ -8,9 +8,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scenes import cloth_3d, pendulum_2d, rope_2d
 
 from pbd_gym.physics import ModelBuilder, World, shapes
+from scenes import cloth_3d, pendulum_2d, rope_2d
 
 WORLDS = 35  # a tile of 32 lanes and a remainder of 3, or four tiles of 8 and a remainder of 3
 STEPS = 6

@@ -4,9 +4,9 @@ import zipfile
 
 import numpy as np
 import pytest
-from scenes import cloth_3d, rope_2d, world
 
 from pbd_gym.physics import Snapshot, World
+from scenes import cloth_3d, rope_2d, world
 
 
 def moving(num_worlds=2, **keywords):

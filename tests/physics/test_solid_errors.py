@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from refusals import refused
 
 from pbd_gym.physics import ModelBuilder, frame_targets, shapes
+from refusals import refused
 
 NAN, INF = np.nan, np.inf
 TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import GRAVITY, momenta, world
 
 from pbd_gym.physics import ModelBuilder, World, shapes
+from scenes import GRAVITY, momenta, world
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 3**0.5
 SQUARE = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])

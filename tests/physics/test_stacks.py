@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import GRAVITY, world
 
 from pbd_gym.physics import ModelBuilder, shapes
+from scenes import GRAVITY, world
 
 DT, SUBSTEPS = 1 / 60, 10
 # Contacts are left alone when a sweep moves nothing by more than g h^2/1000. What is lacking of

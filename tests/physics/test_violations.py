@@ -1,9 +1,9 @@
 """Strains, violations and stored energies are those of the geometry; contacts are told."""
 
 import numpy as np
-from scenes import particles_2d
 
 from pbd_gym.physics import ModelBuilder, readouts
+from scenes import particles_2d
 
 
 def placed(model):

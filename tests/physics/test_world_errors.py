@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scenes import rope_2d, world
 
 from pbd_gym.physics import World
+from scenes import rope_2d, world
 
 
 def moving(num_worlds=3):
