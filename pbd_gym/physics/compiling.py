@@ -32,6 +32,8 @@ from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 
 _SETTINGS: Any = importlib.import_module("numba.core.config")
+# whether kernels are run as plain Python (NUMBA_DISABLE_JIT)
+DISABLED = bool(_SETTINGS.DISABLE_JIT)
 _KERNELS = Path(__file__).parent / "kernels"
 # two threads that load the same kernels would see each other's half-loaded modules
 _loading = threading.Lock()
@@ -47,7 +49,7 @@ def kernel(function: Callable[..., Any], **options: Any) -> Any:
     dispatcher = _compiled(
         function, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False, **options
     )
-    if not _SETTINGS.DISABLE_JIT:
+    if not DISABLED:
         dispatcher.__class__ = _Inner
     return dispatcher
 
@@ -124,7 +126,7 @@ def _row(typing_context: Any, array: Any, index: Any) -> Any:
 
 # A bare pointer to a row of a two-dimensional array. A view would be counted as a reference, and
 # the atomic counting of three views per constraint takes longer than the arithmetic on 16 lanes.
-row: Any = operator.getitem if _SETTINGS.DISABLE_JIT else intrinsic(_row)
+row: Any = operator.getitem if DISABLED else intrinsic(_row)
 
 
 def _keep_write(
@@ -169,7 +171,7 @@ def compiled_for(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any
     Called through numba's dispatcher, the types of all arrays of a model are found out again in
     every call, which takes as long as a step of a small model. The machine code trusts its caller.
     """
-    if _SETTINGS.DISABLE_JIT:
+    if DISABLED:
         return function
     return function.get_overload(tuple(map(function.typeof_pyval, arguments)))
 
@@ -194,7 +196,7 @@ def cache_folder() -> Path | None:
     # what every package may call or be compiled for
     shared = [
         Path(__file__).with_name(name)
-        for name in ("compiling.py", "parameters.py", "tables.py", "portable.py")
+        for name in ("compiling.py", "parameters.py", "tables.py", "tickets.py", "portable.py")
     ]
     for source in (*sorted(_KERNELS.glob("*.py")), *shared):
         digest.update(source.read_bytes())

@@ -13,15 +13,16 @@ from pbd_gym.physics.recording import allocate_forces, copy_of_forces
 from pbd_gym.physics.scratch import allocate
 from pbd_gym.physics.snapshot import Snapshot
 from pbd_gym.physics.targets import check_targets
-from pbd_gym.physics.threads import cores, pool
+from pbd_gym.physics.threads import Crew, cores
+from pbd_gym.physics.tickets import new_tickets
 from pbd_gym.physics.timestep import Adaptive, count_substeps, is_whole, timing_of
 
 # One world runs in scalar code. Below this number of worlds a tile of lanes would be mostly empty.
 _FEWEST_FOR_LANES = 8
 _BATCH_LANES = 32
 # Numbers in the model's tables, times worlds: a substep reads each once, so they tell its work.
-# Below this, waking a second thread costs more than it brings.
-_FEWEST_NUMBERS_FOR_THREADS = 2**18
+# Below this, waking a second thread can cost more than it brings.
+_FEWEST_NUMBERS_FOR_THREADS = 2**15
 
 
 class World:
@@ -86,6 +87,8 @@ class World:
         self._scratch = [
             allocate(model, self.lanes, width, self.dtype) for _ in range(self.num_threads)
         ]
+        driven = (self.num_worlds, len(self._driven), model.dim)
+        self._targets = np.zeros(driven, dtype=self.dtype)
         self._substeps_used = np.zeros(self.num_worlds, dtype=np.int64)
         self._settings: tuple[Any, ...] = ()
         self.forces: Forces | None = None
@@ -159,33 +162,22 @@ class World:
         if (dt, substeps, record) != self._settings:
             self._set(dt, substeps, record)
         if targets is None:
-            targets = np.ascontiguousarray(self._x[:, self._driven])
+            self._targets[:] = self._x[:, self._driven]
         else:
             targets = np.ascontiguousarray(targets, dtype=self.dtype)
-            expected = (self.num_worlds, len(self._driven), self.model.dim)
-            if targets.shape != expected:
-                raise ValueError(f"targets have shape {targets.shape}; expected {expected}")
+            if targets.shape != self._targets.shape:
+                raise ValueError(
+                    f"targets have shape {targets.shape}; expected {self._targets.shape}"
+                )
             check_targets(targets, self.model.pins, self._grabbed)
+            self._targets[:] = targets
         if isinstance(substeps, Adaptive):
-            self._advance_in_groups(dt, substeps, targets)
+            self._advance_in_groups(dt, substeps)
         else:
-            self._advance(targets, self._shares, substeps)
+            self._crew.work()
         self.forces = copy_of_forces(self.model, self._noted[0][2]) if record else None
 
-    def _advance(self, targets: np.ndarray, shares: list[tuple[Any, ...]], substeps: int) -> None:
-        """Advance the worlds of each share on a thread of its own."""
-        timing = self._timings[substeps]
-        waiting = [
-            pool(self.num_threads - 1).submit(
-                self._compiled, self._x, self._v, targets, *share, timing, substeps
-            )
-            for share in shares[1:]
-        ]
-        self._compiled(self._x, self._v, targets, *shares[0], timing, substeps)
-        for future in waiting:
-            future.result()
-
-    def _advance_in_groups(self, dt: float, substeps: Adaptive, targets: np.ndarray) -> None:
+    def _advance_in_groups(self, dt: float, substeps: Adaptive) -> None:
         """Advance the worlds that take the same number of substeps together."""
         model, used = self.model, self._substeps_used
         limits = (float(substeps.reach), int(substeps.least), int(substeps.most))
@@ -194,7 +186,7 @@ class World:
         count_substeps(
             self._x,
             self._v,
-            targets,
+            self._targets,
             free,
             pins,
             grabbable,
@@ -206,17 +198,17 @@ class World:
         )
         for count in np.unique(used):
             worlds = np.flatnonzero(used == count)
-            self._advance(targets, self._share_out(worlds), int(count))
+            tiles = -(-len(worlds) // self.lanes)
+            Crew(self._compiled, self._arguments(worlds, int(count)), tiles, linger=False).work()
 
-    def _share_out(self, worlds: np.ndarray | None) -> list[tuple[Any, ...]]:
-        """Return what each thread is given: tiles, scratch, and what all of them read."""
-        count = self.num_worlds if worlds is None else len(worlds)
-        tiles = -(-count // self.lanes)
-        bounds = np.linspace(0, tiles, self.num_threads + 1).astype(np.int64)
+    def _arguments(self, worlds: np.ndarray | None, substeps: int) -> list[tuple[Any, ...]]:
+        """Return what each thread hands the kernel after tickets and helper."""
+        state = (self._x, self._v, self._targets, worlds)
         grabbed = None if self.model.particles.grabbable is None else self._grabbed
+        timing = self._timings[substeps]
         return [
-            (bounds[i : i + 2].copy(), worlds, *scratch, grabbed, forces, self._parameters)
-            for i, (scratch, forces) in enumerate(zip(self._scratch, self._noted, strict=True))
+            (*state, *scratch, grabbed, forces, self._parameters, timing, substeps)
+            for scratch, forces in zip(self._scratch, self._noted, strict=True)
         ]
 
     def _set(self, dt: float, substeps: int | Adaptive, record: bool) -> None:
@@ -232,13 +224,14 @@ class World:
             self._noted = allocate_forces(
                 model, self.num_worlds, self.lanes, self.num_threads, dtype
             )
-        self._shares = self._share_out(np.zeros(1, dtype=np.int64) if adaptive else None)
         self._substeps_used[:] = counts[0]
-        self._compile(counts[0], adaptive, record)
+        arguments = self._arguments(np.zeros(1, dtype=np.int64) if adaptive else None, counts[0])
+        self._compile(arguments[0], adaptive, record)
+        self._crew = Crew(self._compiled, arguments, -(-self.num_worlds // self.lanes))
         self._settings = (dt, substeps, record)
 
-    def _compile(self, substeps: int, adaptive: bool, record: bool) -> None:
-        """Compile on a world of its own, so that the first real step is like any other."""
+    def _compile(self, arguments: tuple[Any, ...], adaptive: bool, record: bool) -> None:
+        """Compile by a call without tiles, so that the first real step is like any other."""
         model = self.model
         kinds = (
             "colliders",
@@ -261,10 +254,7 @@ class World:
         variant += [kind.replace("_", "-") for kind in present]
         variant += [name for name, wanted in extras.items() if wanted]
         done = compiling.announce_compilation(", ".join(variant))
-        no_tiles = np.zeros(2, dtype=np.int64)
-        targets = np.ascontiguousarray(self._x[:, self._driven])
-        share = (no_tiles, *self._shares[0][1:])
-        arguments = (self._x, self._v, targets, *share, self._timings[substeps], substeps)
+        arguments = (new_tickets(0, 0), -1, *arguments)
         self._kernels.advance(*arguments)
         self._compiled = compiling.compiled_for(self._kernels.advance, arguments)
         done()

@@ -1,6 +1,7 @@
 """The control step of a tile of worlds: predict, project, read velocity (seed thesis, 5.1)."""
 
 from ..compiling import borrowing, in_place, kernel, row
+from ..tickets import are_more, finish, is_done, take
 from .attachment import project_attachments
 from .chain import project_chain_velocities, project_chains, project_chains_from_start
 from .collider import collide_with_shapes
@@ -44,15 +45,30 @@ __all__ = ["DIM", "LANES", "WIDTH", "advance"]
 
 @borrowing
 def advance(
-    x, v, targets, tiles, worlds, work, found, listed, grabbed, forces, model, timing, substeps
+    tickets,
+    helper,
+    x,
+    v,
+    targets,
+    worlds,
+    work,
+    found,
+    listed,
+    grabbed,
+    forces,
+    model,
+    timing,
+    substeps,
 ):
-    """Advance the worlds of tiles[0] <= tile < tiles[1] by one control step, in place.
+    """Advance the worlds of all tiles that this thread gets by one control step, in place.
 
     Args:
+        tickets: Hand out the tiles of LANES worlds.
+        helper: Which helper this thread is, -1 if it was asked for the step. A helper looks out for
+            more tiles, those of the next step, before it returns.
         x: Positions (W, N, DIM) [m].
         v: Velocities (W, N, DIM) [m/s].
         targets: Where pins and grabbed particles are at the end of the step, (W, P + G, DIM) [m].
-        tiles: First and last + 1 tile of LANES worlds.
         worlds: Those worlds that are advanced, in the order of the lanes, or None for all.
         work: Scratch (N + 3, WIDTH); the last row is zero.
         found: Scratch of self-collision (see `find_pairs`), or None.
@@ -63,48 +79,80 @@ def advance(
             serves it returns at once, and nothing behind that is compiled.
         timing: The Timing.
         substeps: Number of substeps.
+
+    Returns:
+        Whether all tiles are done.
     """
+    while True:
+        tile = take(tickets)
+        if tile >= 0:
+            _advance_tile(
+                tile,
+                x,
+                v,
+                targets,
+                worlds,
+                work,
+                found,
+                listed,
+                grabbed,
+                forces,
+                model,
+                timing,
+                substeps,
+            )
+            finish(tickets)
+        elif helper < 0:
+            return is_done(tickets)
+        elif not are_more(tickets, helper):
+            return True
+
+
+@in_place
+def _advance_tile(
+    tile, x, v, targets, worlds, work, found, listed, grabbed, forces, model, timing, substeps
+):
+    """Advance the worlds of a tile by one control step."""
     masses = model.particles
-    for tile in range(tiles[0], tiles[1]):
-        for attempt in range(2):
-            load(x, v, tile, worlds, work, masses, grabbed)
-            aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
-            find_pairs(work, masses, model.self_collision, found, timing)
-            list_encounters(work, model.encounters, listed, timing)
-            for substep in range(substeps):
-                remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
-                forget_forces(forces)
-                _predict(work, masses, timing, model.second_order)
-                move_pins(x, targets, tile, worlds, work, masses, remaining)
-                _project(work, model, found, timing, model.iterations, model.second_order, forces)
-                _project_again(work, model, found, timing, model.second_order, forces)
-                _collide_with_others(work, model, model.encounters, listed, timing, forces)
-                collide_with_shapes(work, masses, model.colliders, timing, forces)
-                collide_with_walls(work, masses, model.room, forces)
-                limit_strains(work, masses, model.chains, forces)
-                if attempt > 0:
-                    limit_moves(work, masses, timing.speed_limit * timing.h)
-                read_velocities(work, masses, model.room, timing.h, timing.rest_speed, forces)
-                _finish(work, model, timing, model.second_order, forces)
-                part_from_others(work, masses, model.encounters, listed, timing.h, forces)
-                rub_against_self(
-                    work, masses, model.self_collision, found, timing.h, timing.gravity, forces
-                )
-                damp_chains(work, masses, model.chains, timing.h)
-                if attempt > 0:
-                    limit_velocities(work, masses, timing.speed_limit)
+    for attempt in range(2):
+        load(x, v, tile, worlds, work, masses, grabbed)
+        aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
+        find_pairs(work, masses, model.self_collision, found, timing)
+        list_encounters(work, model.encounters, listed, timing)
+        for substep in range(substeps):
+            remaining = x.dtype.type(substeps - 1 - substep) / x.dtype.type(substeps)
+            forget_forces(forces)
+            _predict(work, masses, timing, model.second_order)
+            move_pins(x, targets, tile, worlds, work, masses, remaining)
+            _project(work, model, found, timing, model.iterations, model.second_order, forces)
+            _project_again(work, model, found, timing, model.second_order, forces)
+            _collide_with_others(work, model, model.encounters, listed, timing, forces)
+            collide_with_shapes(work, masses, model.colliders, timing, forces)
+            collide_with_walls(work, masses, model.room, forces)
+            limit_strains(work, masses, model.chains, forces)
             if attempt > 0:
-                # 0 times infinity is no number: pins too are put where they belong
-                aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
-                move_pins(x, targets, tile, worlds, work, masses, x.dtype.type(0))
-            add_up_speeds(work, masses)
-            if attempt == 0:
-                failed = is_too_fast(work, timing.speed_limit)
-            take_out_gain(x, v, tile, worlds, work, model, timing)
-            store(x, v, tile, worlds, work, attempt)
-            store_forces(forces, x, tile, worlds, work, timing.inverse_h2, attempt)
-            if not failed:
-                break
+                limit_moves(work, masses, timing.speed_limit * timing.h)
+            read_velocities(work, masses, model.room, timing.h, timing.rest_speed, forces)
+            _finish(work, model, timing, model.second_order, forces)
+            part_from_others(work, masses, model.encounters, listed, timing.h, forces)
+            rub_against_self(
+                work, masses, model.self_collision, found, timing.h, timing.gravity, forces
+            )
+            damp_chains(work, masses, model.chains, timing.h)
+            if attempt > 0:
+                limit_velocities(work, masses, timing.speed_limit)
+        if attempt > 0:
+            # 0 times infinity is no number: pins too are put where they belong
+            aim_pins(x, targets, tile, worlds, work, masses, timing.dt)
+            move_pins(x, targets, tile, worlds, work, masses, x.dtype.type(0))
+        add_up_speeds(work, masses)
+        if attempt == 0:
+            failed = is_too_fast(work, timing.speed_limit)
+        take_out_gain(x, v, tile, worlds, work, model, timing)
+        store(x, v, tile, worlds, work, attempt)
+        store_forces(forces, x, tile, worlds, work, timing.inverse_h2, attempt)
+        if not failed:
+            break
 
 
 @kernel
