@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -54,9 +55,27 @@ class Crew:
         self._looks = LINGER if linger else 0
         self._tickets = new_tickets(len(self._helpers), self._looks)
         self._pool: Any = None
+        self._working = threading.Lock()
 
     def work(self) -> None:
-        """Have all tiles done."""
+        """Have all tiles done.
+
+        Raises:
+            RuntimeError: If another thread is at it.
+        """
+        if not self._working.acquire(blocking=False):
+            raise RuntimeError("another thread is stepping these worlds; give each its own")
+        try:
+            self._hand_out()
+            self._finish()
+        except BaseException:  # Ctrl-C: a helper may still be at a tile
+            self._finish()
+            raise
+        finally:
+            self._working.release()
+
+    def _hand_out(self) -> None:
+        """Open the tickets, and call those helpers who sleep."""
         if self._helpers and self._pool is not _pool(len(self._helpers)):
             # for the first time, or in a forked child: nobody is there yet
             self._pool = _pool(len(self._helpers))
@@ -65,5 +84,8 @@ class Crew:
         for helper, arguments in enumerate(self._helpers):
             if called(self._tickets, helper):
                 self._pool.submit(self._function, self._tickets, helper, *arguments)
+
+    def _finish(self) -> None:
+        """Take part until all tiles are done."""
         while not self._function(self._tickets, -1, *self._own):
             time.sleep(0)

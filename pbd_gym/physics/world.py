@@ -158,6 +158,7 @@ class World:
         Raises:
             ValueError: If dt or substeps are not positive, or the targets' shape is wrong or one
                 of them is not finite. Nothing has moved then.
+            RuntimeError: If another thread is stepping this world.
         """
         if (dt, substeps, record) != self._settings:
             self._set(dt, substeps, record)

@@ -2,11 +2,13 @@
 
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pbd_gym.physics import Adaptive, ModelBuilder, World, shapes
+from pbd_gym.physics.threads import Crew
 
 WORLDS = 200  # seven tiles of lanes, the last one not full
 PAUSES = {"back to back": (0.0, 100), "after a pause": (0.005, 40)}  # [s] between steps, and steps
@@ -36,7 +38,7 @@ def assert_same(one: World, other: World) -> None:
     assert np.array_equal(one.v, other.v)
 
 
-@pytest.mark.parametrize("pause, steps", PAUSES.values(), ids=PAUSES)
+@pytest.mark.parametrize(("pause", "steps"), PAUSES.values(), ids=PAUSES)
 @pytest.mark.parametrize("num_threads", [2, 3, 7])
 def test_helpers_that_wait_or_sleep_between_steps_change_no_bit(num_threads, pause, steps):
     assert_same(swung(num_threads, steps, pause), swung(1, steps))
@@ -68,3 +70,28 @@ def test_a_world_goes_on_where_steps_of_another_kind_have_come_between():
         for step in range(30):
             world.step(1 / 60, substeps=2 + step % 2)
     assert_same(alone, shared)
+
+
+def test_worlds_that_are_being_stepped_are_refused_to_another_thread():
+    def work_again(*_: Any) -> bool:
+        with pytest.raises(RuntimeError, match="another thread is stepping"):
+            crew.work()
+        return True
+
+    crew = Crew(work_again, [()], tiles=1)
+    crew.work()
+    crew.work()  # afterwards it is free again
+
+
+def test_an_interrupted_step_is_finished_first():
+    answers = [KeyboardInterrupt(), False, True]
+
+    def work(*_: Any) -> bool:
+        answer = answers.pop(0)
+        if isinstance(answer, KeyboardInterrupt):
+            raise answer
+        return answer
+
+    with pytest.raises(KeyboardInterrupt):
+        Crew(work, [()], tiles=1).work()
+    assert not answers
