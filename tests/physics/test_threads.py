@@ -1,6 +1,5 @@
 """Threads share the tiles of worlds: who advances a tile, and when, makes no difference."""
 
-import threading
 import time
 from typing import Any
 
@@ -49,19 +48,6 @@ def test_threads_share_worlds_that_take_different_numbers_of_substeps():
     alone, shared = (swung(number, 20, substeps=substeps) for number in (1, 3))
     assert len(np.unique(alone.substeps_used)) > 1
     assert_same(alone, shared)
-
-
-def test_two_threads_of_python_step_two_worlds_at_once():
-    expected = swung(1, 200)
-    worlds: list[World] = []
-    both = [threading.Thread(target=lambda: worlds.append(swung(2, 200))) for _ in range(2)]
-    for thread in both:
-        thread.start()
-    for thread in both:
-        thread.join()
-    for world in worlds:
-        assert_same(world, expected)
-    assert len(worlds) == 2
 
 
 def test_a_world_goes_on_where_steps_of_another_kind_have_come_between():
