@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -55,24 +54,15 @@ class Crew:
         self._looks = LINGER if linger else 0
         self._tickets = new_tickets(len(self._helpers), self._looks)
         self._pool: Any = None
-        self._working = threading.Lock()
 
     def work(self) -> None:
-        """Have all tiles done.
-
-        Raises:
-            RuntimeError: If another thread is at it.
-        """
-        if not self._working.acquire(blocking=False):
-            raise RuntimeError("another thread is stepping these worlds; give each its own")
+        """Have all tiles done."""
         try:
             self._hand_out()
             self._finish()
         except BaseException:  # Ctrl-C: a helper may still be at a tile
             self._finish()
             raise
-        finally:
-            self._working.release()
 
     def _hand_out(self) -> None:
         """Open the tickets, and call those helpers who sleep."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,7 @@ class World:
         self._targets = np.zeros(driven, dtype=self.dtype)
         self._substeps_used = np.zeros(self.num_worlds, dtype=np.int64)
         self._settings: tuple[Any, ...] = ()
+        self._stepping = threading.Lock()
         self.forces: Forces | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -158,8 +160,18 @@ class World:
         Raises:
             ValueError: If dt or substeps are not positive, or the targets' shape is wrong or one
                 of them is not finite. Nothing has moved then.
-            RuntimeError: If another thread is stepping this world.
+            RuntimeError: If another thread is stepping this world. That step goes on.
         """
+        if not self._stepping.acquire(blocking=False):
+            raise RuntimeError("another thread is stepping these worlds; give each its own")
+        try:
+            self._step(dt, substeps, targets, record)
+        finally:
+            self._stepping.release()
+
+    def _step(
+        self, dt: float, substeps: int | Adaptive, targets: np.ndarray | None, record: bool
+    ) -> None:
         if (dt, substeps, record) != self._settings:
             self._set(dt, substeps, record)
         if targets is None:

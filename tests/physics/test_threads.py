@@ -58,15 +58,25 @@ def test_a_world_goes_on_where_steps_of_another_kind_have_come_between():
     assert_same(alone, shared)
 
 
-def test_worlds_that_are_being_stepped_are_refused_to_another_thread():
-    def work_again(*_: Any) -> bool:
-        with pytest.raises(RuntimeError, match="another thread is stepping"):
-            crew.work()
-        return True
+@pytest.mark.parametrize("substeps", [4, Adaptive(reach=0.005, least=2, most=16)])
+def test_a_world_that_is_being_stepped_is_refused_to_another_thread(monkeypatch, substeps):
+    world, alone = ropes(2), ropes(1)
+    elsewhere = np.full((WORLDS, 1, 2), 1.0, dtype=np.float32)
+    work, refusals = Crew.work, []
 
-    crew = Crew(work_again, [()], tiles=1)
-    crew.work()
-    crew.work()  # afterwards it is free again
+    def work_while_another_comes(crew: Crew) -> None:
+        with pytest.raises(RuntimeError, match="another thread is stepping") as refusal:
+            world.step(1 / 30, substeps=3, targets=elsewhere)
+        refusals.append(refusal)
+        work(crew)
+
+    alone.step(1 / 60, substeps=substeps)
+    with monkeypatch.context() as patch:
+        patch.setattr(Crew, "work", work_while_another_comes)
+        world.step(1 / 60, substeps=substeps)
+    assert refusals
+    assert_same(world, alone)
+    world.step(1 / 60, substeps=substeps)  # afterwards it is free again
 
 
 def test_an_interrupted_step_is_finished_first():
