@@ -23,7 +23,7 @@ _FEWEST_FOR_LANES = 8
 _BATCH_LANES = 32
 # Numbers in the model's tables, times worlds: a substep reads each once, so they tell its work.
 # Below this, waking a second thread can cost more than it brings.
-_FEWEST_NUMBERS_FOR_THREADS = 2**15
+_FEWEST_NUMBERS_FOR_THREADS = 2**16
 
 
 class World:
