@@ -5,13 +5,14 @@
 
 The README's are kept in docs/images; the looks of all environments go to build/gallery. The folder
 holds policies that PPO of stable-baselines3 has saved, named after their environments, such as
-models/PBDRope-v0.zip; environments without one are filmed with their scripted policy.
+models/PBDRope-v0.zip; environments without one are filmed with their scripted policy, three links
+with the planner.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ import gymnasium
 import numpy as np
 
 import pbd_gym  # noqa: F401  (registers the environments)
+from pbd_gym.planning import Planner, planner_settings
 from pbd_gym.play import load_agent
 from pbd_gym.rendering import VideoWriter, Viewpoint, grid
 
@@ -42,8 +44,10 @@ FILMS: tuple[tuple[str, str, int, int, int, dict[str, Any]], ...] = (
     ("strain", "PBDCloth-v0", 5, 90, 2, {**STRAIN, "camera": NEAR}),
 )
 FILM_SIZE = 272
+PLANNED = ("PBDTriplePendulum-v0",)  # its scripted policy fails
 
 Models = dict[str, Path]
+Policy = Callable[[Any], np.ndarray]
 
 
 def main() -> None:
@@ -84,15 +88,32 @@ def find_models(folder: Path | None) -> Models:
     return {id: folder / f"{id}.zip" for id in IDS if (folder / f"{id}.zip").is_file()}
 
 
-def episode(id: str, seed: int, steps: int, models: Models, **look: Any) -> Iterator[Any]:
+def episode(
+    id: str, seed: int, steps: int, models: Models, *, planned: bool = False, **look: Any
+) -> Iterator[Any]:
     """Yield an environment at the start of an episode and after each of its steps."""
     policy, options = load_agent(str(models.get(id, "scripted")), "ppo", id)
     env = gymnasium.make(id, render_mode="rgb_array", **look, **options)
+    if planned:
+        policy = plan_in(env, id)
     observation, _ = env.reset(seed=seed)
     yield env
     for _ in range(steps):
         observation, *_ = env.step(policy(observation))
         yield env
+
+
+def plan_in(env: gymnasium.Env, id: str) -> Policy:
+    """Return a policy that plans from the environment's true state, whatever it observes."""
+    planner = Planner(env.get_wrapper_attr("task"), planner_settings(id))
+    state, queue = env.get_wrapper_attr("get_state"), list[np.ndarray]()
+
+    def act(observation: Any) -> np.ndarray:
+        if not queue:
+            queue.extend(planner.plan(state()).actions[0, : planner.settings.replan])
+        return queue.pop(0)
+
+    return act
 
 
 def draw_tasks(models: Models) -> None:
@@ -115,7 +136,9 @@ def draw_film(
     models: Models,
 ) -> None:
     """Film one episode, and let its end stand for a second."""
-    envs = episode(id, seed, steps, models, render_size=(FILM_SIZE, FILM_SIZE), **look)
+    planned = id in PLANNED and id not in models
+    look = {"render_size": (FILM_SIZE, FILM_SIZE), **look}
+    envs = episode(id, seed, steps, models, planned=planned, **look)
     frames = [env.render() for env in envs]
     rate = gymnasium.make(id).metadata["render_fps"] / stride
     with VideoWriter(path, rate) as video:

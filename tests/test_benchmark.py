@@ -1,6 +1,7 @@
 """The comparison of policies over seeds: its statistics, what it skips, and what it writes."""
 
 import math
+import os
 import sys
 from pathlib import Path
 
@@ -93,7 +94,7 @@ def test_a_benchmark_skips_what_is_done_and_goes_on_where_it_was_stopped(tmp_pat
     assert (results / "PBDPendulum-v0.png").read_bytes().startswith(b"\x89PNG")
 
     asked = []
-    monkeypatch.setattr(benchmark.subprocess, "run", lambda command, check: asked.append(command))
+    monkeypatch.setattr(benchmark, "run_script", lambda script, quiet: asked.append(script))
     assert benchmark.main(options) == 0
     assert not asked
     (runs / "PBDPendulum-v0-ppo-0" / "evaluation.json").unlink()
@@ -103,7 +104,40 @@ def test_a_benchmark_skips_what_is_done_and_goes_on_where_it_was_stopped(tmp_pat
     assert read_scores(results / "baselines.csv")[1] == scores[1]
 
 
-def test_a_number_of_seeds_below_one_is_refused(capsys):
+def test_jobs_at_once_give_the_same_table(tmp_path):
+    tables = []
+    for jobs in ("1", "2"):
+        folder = tmp_path / jobs
+        options = ["--env", "PBDPendulum-v0", "--policy", "noop", "random", "--seeds", "2"]
+        options += ["--episodes", "2", "--jobs", jobs]
+        options += ["--log-dir", str(folder / "runs"), "--results", str(folder)]
+        assert benchmark.main(options) == 0
+        tables.append((folder / "baselines.csv").read_text(encoding="utf-8"))
+    assert tables[0] == tables[1]
+    assert len(tables[0].splitlines()) == 5
+
+
+def test_jobs_share_the_cores_and_none_is_without():
+    cores = os.sched_getaffinity(0)
+    for jobs in (1, 2, 3, len(cores) + 1):
+        shares = benchmark.shares_of_cores(jobs)
+        assert len(shares) == jobs
+        assert all(shares)
+        assert set.union(*shares) == cores
+
+
+def test_a_job_that_fails_stops_the_benchmark_and_tells_why(tmp_path, monkeypatch, capsys):
+    script = ["-c", "import sys; sys.exit('the disk is full')"]
+    monkeypatch.setattr(benchmark, "command", lambda cell, options: script)
+    options = ["--env", "PBDPendulum-v0", "--policy", "noop", "--jobs", "2"]
+    options += ["--log-dir", str(tmp_path / "runs"), "--results", str(tmp_path)]
     with pytest.raises(SystemExit):
-        benchmark.main(["--seeds", "0"])
-    assert "--seeds must be at least 1" in capsys.readouterr().err
+        benchmark.main(options)
+    assert "the disk is full" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["seeds", "jobs"])
+def test_a_number_below_one_is_refused(capsys, option):
+    with pytest.raises(SystemExit):
+        benchmark.main([f"--{option}", "0"])
+    assert f"--{option} must be at least 1" in capsys.readouterr().err

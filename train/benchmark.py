@@ -9,10 +9,12 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,6 +42,7 @@ MARKS = "<!-- baselines -->", "<!-- /baselines -->"
 EXAMPLES = """\
 examples:
   python train/benchmark.py
+  python train/benchmark.py --jobs 2
   python train/benchmark.py --env PBDRope-v0 PBDCloth-v0 --policy scripted ppo --seeds 3
   python train/benchmark.py --report-only
       table and figures from the results that are there
@@ -83,6 +86,13 @@ def build_parser() -> argparse.ArgumentParser:
         "--total-timesteps", type=int, metavar="N", help="of each training (by the environment)"
     )
     parser.add_argument(
+        "--jobs",
+        type=int,
+        default=1,
+        metavar="N",
+        help="processes at once, each on its share of the cores (default: %(default)s)",
+    )
+    parser.add_argument(
         "--log-dir", type=Path, default=Path("runs/baselines"), help="of all runs (%(default)s)"
     )
     parser.add_argument(
@@ -107,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the script; return its exit status."""
     parser = build_parser()
     options = parser.parse_args(arguments)
-    for name in ("seeds", "episodes", "planner_episodes"):
+    for name in ("seeds", "episodes", "planner_episodes", "jobs"):
         if getattr(options, name) < 1:
             parser.error(f"--{name.replace('_', '-')} must be at least 1")
     cells = [
@@ -124,7 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not options.report_only:
             run_all(cells, options)
         report(cells, options)
-    except (OSError, ValueError, subprocess.CalledProcessError) as error:
+    except (OSError, ValueError) as error:
         parser.error(str(error))
     except KeyboardInterrupt:
         print("\nStopped; the same command goes on from here.")
@@ -133,14 +143,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run_all(cells: Sequence[Cell], options: argparse.Namespace) -> None:
-    """Run the cells that are not done, one after the other."""
+    """Run the cells that are not done, some at once."""
     missing = [cell for cell in cells if not result_of(cell, options.log_dir).exists()]
     began = time.monotonic()
-    for number, cell in enumerate(missing, start=1):
+
+    def run(number: int, cell: Cell) -> None:
         minutes = (time.monotonic() - began) / 60
-        print(f"[{number}/{len(missing)}, {minutes:.0f} min] {cell.env} {cell.policy} {cell.seed}")
-        sys.stdout.flush()
-        subprocess.run([sys.executable, *command(cell, options)], check=True)
+        place = f"[{number}/{len(missing)}, {minutes:.0f} min]"
+        print(f"{place} {cell.env} {cell.policy} {cell.seed}", flush=True)
+        # progress bars of several processes would overwrite each other
+        run_script(command(cell, options), quiet=options.jobs > 1)
+
+    shares = iter(shares_of_cores(options.jobs))
+    pool = ThreadPoolExecutor(options.jobs, initializer=lambda: keep_to(next(shares)))
+    try:
+        for done in as_completed([pool.submit(run, *job) for job in enumerate(missing, start=1)]):
+            done.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def run_script(script: list[str], *, quiet: bool) -> None:
+    """Run a script in a process of its own; raise ValueError with what it says if it fails."""
+    done = subprocess.run([sys.executable, *script], capture_output=quiet, text=True, check=False)
+    if done.returncode:
+        said = f":\n{done.stderr[-2000:]}" if quiet else ""
+        raise ValueError(f"{' '.join(script)} ended with {done.returncode}{said}")
+
+
+def shares_of_cores(jobs: int) -> list[set[int]]:
+    """Return the cores that each of some jobs may use, no fewer than one."""
+    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else [0]
+    return [set(cores[job % len(cores) :: jobs]) for job in range(jobs)]
+
+
+def keep_to(cores: set[int]) -> None:
+    """Keep this thread, and the processes it starts, to some cores, where that can be said."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, cores)
 
 
 def command(cell: Cell, options: argparse.Namespace) -> list[str]:
