@@ -131,7 +131,7 @@ class SB3VecEnv(VecEnv):
         if any(other != options for other in self._options):
             raise ValueError("options must be the same for all worlds of a batch")
         observation, info = self.env.reset(seed=seeds, options=options or None)
-        self.reset_infos = _world_infos(info, np.arange(self.num_envs))
+        self.reset_infos = [_world_info(info, world) for world in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0.0
@@ -158,17 +158,11 @@ class SB3VecEnv(VecEnv):
     ) -> None:
         """Fill the infos of the `worlds` whose episode has ended, and zero their statistics."""
         seconds = time.time() - self._created
-        episodes = zip(
-            worlds.tolist(),
-            _world_infos(info["final_info"], worlds),
-            (~terminated[worlds]).tolist(),
-            self._returns[worlds].tolist(),
-            self._lengths[worlds].tolist(),
-            strict=True,
-        )
-        for world, final_info, timed_out, total, length in episodes:
+        for world in worlds.tolist():
+            final_info = _world_info(info["final_info"], world)
             final_info["terminal_observation"] = info["final_obs"][world]
-            final_info["TimeLimit.truncated"] = timed_out
+            final_info["TimeLimit.truncated"] = not terminated[world]
+            total, length = self._returns.item(world), self._lengths.item(world)
             final_info["episode"] = {"r": total, "l": length, "t": seconds}
             infos[world] = final_info
         self._returns[worlds] = 0.0
@@ -227,16 +221,10 @@ class SB3VecEnv(VecEnv):
         return [issubclass(wrapper_class, Monitor) for _ in self._get_indices(indices)]
 
 
-def _world_infos(info: dict[str, Any], worlds: np.ndarray) -> list[dict[str, Any]]:
-    """Turn Gymnasium's dict of arrays with `_key` masks into one dict for each of `worlds`."""
-    infos: list[dict[str, Any]] = [{} for _ in worlds]
-    for key, values in info.items():
-        if key.startswith("_"):
-            continue
-        chosen = values[worlds]
-        entries = chosen.tolist() if chosen.ndim == 1 else list(chosen)
-        present = info[f"_{key}"][worlds].tolist()
-        for world_info, entry, has_entry in zip(infos, entries, present, strict=True):
-            if has_entry:
-                world_info[key] = entry
-    return infos
+def _world_info(info: dict[str, Any], world: int) -> dict[str, Any]:
+    """Return one world's part of Gymnasium's dict of arrays with `_key` masks."""
+    return {
+        key: values.item(world) if values.ndim == 1 else values[world]
+        for key, values in info.items()
+        if not key.startswith("_") and info[f"_{key}"][world]
+    }

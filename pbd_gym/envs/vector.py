@@ -209,8 +209,8 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
         last = np.full(self.num_envs, None, dtype=object)
         for world in worlds.tolist():
             last[world] = world_of(observation, world)
-        infos["final_obs"], infos["_final_obs"] = last, ended.copy()
-        infos["final_info"], infos["_final_info"] = _infos(info, ended), ended
+        infos["final_obs"], infos["final_info"] = last, _infos(info, ended)
+        infos["_final_obs"] = infos["_final_info"] = ended
         self._begin(worlds, self._generators, {})
         replace(observation, worlds, self._batch.observe(worlds))
         return infos
@@ -250,15 +250,19 @@ class PBDVectorEnv(VectorEnv[Any, np.ndarray, np.ndarray]):
 
 
 def _infos(info: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
-    """Return Gymnasium's vector format: each array, 0 where masked out, and its mask."""
-    shown, hidden = np.flatnonzero(mask), np.flatnonzero(~mask)
+    """Return Gymnasium's vector format: each array, 0 where masked out, and its mask.
+
+    All of them share the mask.
+    """
+    shown = np.flatnonzero(mask)
     infos: dict[str, Any] = {}
     if not len(shown):
         return infos
+    hidden = np.flatnonzero(~mask) if len(shown) < len(mask) else None
     for name, values in info.items():
         wide = values.astype(np.float64) if values.dtype == np.float32 else values
-        infos[name] = _masked(wide, shown, hidden) if len(hidden) else wide
-        infos[f"_{name}"] = mask.copy()
+        infos[name] = wide if hidden is None else _masked(wide, shown, hidden)
+        infos[f"_{name}"] = mask
     return infos
 
 

@@ -43,7 +43,9 @@ class Batch:
         self.variables = {
             name: np.repeat(value, num_worlds, axis=0) for name, value in fresh.items()
         }
-        self._draws = sum(len(spec.low) for spec in task.draws.values())
+        specs = task.draws.values()
+        self._low = np.concatenate([spec.low for spec in specs])
+        self._range = np.concatenate([spec.high - spec.low for spec in specs])
 
     def reset(
         self,
@@ -58,13 +60,12 @@ class Batch:
             generators: Of all W worlds; each begun world draws from its own.
             fixed: Quantities to fix instead, as `check_options` returns them.
         """
-        uniforms = np.array([generators[world].random(self._draws) for world in worlds])
+        shares = [generators[world].random(len(self._low)) for world in worlds.tolist()]
+        drawn = self._low + self._range * np.array(shares)
         quantities, first = {}, 0
         for name, spec in self.task.draws.items():
             last = first + len(spec.low)
-            share = uniforms[:, first:last]
-            drawn = spec.low + (spec.high - spec.low) * share
-            quantities[name] = fixed[name][worlds] if name in fixed else drawn
+            quantities[name] = fixed[name][worlds] if name in fixed else drawn[:, first:last]
             first = last
         start = self.task.start(quantities)
         self.world.x[worlds] = start.x

@@ -138,20 +138,15 @@ class Pendulum(Task):
 
     def start(self, quantities: dict[str, np.ndarray]) -> Start:
         """Place the links at their angles, turning at their rates; upside down where they stand."""
-        cosine, sine = cos_sin(quantities["angles"])
-        link = self.link_length
-        offset = link * np.stack([sine, -cosine], axis=2)
-        motion = link * np.stack([cosine, sine], axis=2) * quantities["rates"][:, :, None]
+        count = len(quantities["angles"])
+        upside = np.zeros((count, 1))
         if "stand" in quantities:
-            stands = quantities["stand"] < self.start_upright
-            sign = np.where(stands, -1.0, 1.0)[:, :, None]
-            offset, motion = sign * offset, sign * motion
-        x = np.zeros((len(cosine), self.links + 1, 2))
-        v = np.zeros_like(x)
-        x[:, 1:] = np.cumsum(offset, axis=1)
-        v[:, 1:] = np.cumsum(motion, axis=1)
-        x[:, :, 0] += quantities["pivot"]
-        return Start(x.astype(np.float32), v.astype(np.float32), {})
+            upside = (quantities["stand"] < self.start_upright).astype(np.float64)
+        x = np.empty((count, self.links + 1, 2), dtype=np.float32)
+        v = np.empty_like(x)
+        swing = *cos_sin(quantities["angles"]), quantities["rates"], quantities["pivot"], upside
+        _place(*map(np.ascontiguousarray, swing), self.link_length, x, v)
+        return Start(x, v, {})
 
     @cached_property
     def _scales(self) -> np.ndarray:
@@ -201,6 +196,38 @@ class Pendulum(Task):
             direction=observation[:, 2 : 2 + count].reshape(shape),
             motion=observation[:, 2 + count :].reshape(shape) * 5.0,
         )
+
+
+@entry
+def _place(
+    cosine: Any, sine: Any, rates: Any, pivot: Any, upside: Any, link_length: float, x: Any, v: Any
+) -> None:
+    """Place n pendulums at their angles from hanging down, turning at their rates.
+
+    Args:
+        cosine: Of the angles, (n, links).
+        sine: (n, links).
+        rates: (n, links) [rad/s].
+        pivot: Position along the rail (n, 1) [m].
+        upside: (n, 1), 1 for what is then turned upside down, else 0.
+        link_length: [m].
+        x: Positions (n, N, 2) [m], written.
+        v: Velocities (n, N, 2) [m/s], written.
+    """
+    for world in range(x.shape[0]):
+        sign = link_length if upside[world, 0] == 0.0 else -link_length
+        across, up, forwards, upwards = 0.0, 0.0, 0.0, 0.0
+        x[world, 0, 0], x[world, 0, 1] = pivot[world, 0], 0.0
+        v[world, 0, 0], v[world, 0, 1] = 0.0, 0.0
+        for link in range(cosine.shape[1]):
+            c, s, rate = cosine[world, link], sine[world, link], rates[world, link]
+            across += sign * s
+            up -= sign * c
+            forwards += sign * c * rate
+            upwards += sign * s * rate
+            x[world, link + 1, 0] = across + pivot[world, 0]
+            x[world, link + 1, 1] = up
+            v[world, link + 1, 0], v[world, link + 1, 1] = forwards, upwards
 
 
 @entry
