@@ -57,6 +57,10 @@ class Crew:
 
     def work(self) -> None:
         """Have all tiles done."""
+        if not self._helpers:
+            open_tickets(self._tickets, self._tiles)
+            self._function(self._tickets, -1, *self._own)
+            return
         try:
             self._hand_out()
             self._finish()
@@ -66,7 +70,7 @@ class Crew:
 
     def _hand_out(self) -> None:
         """Open the tickets, and call those helpers who sleep."""
-        if self._helpers and self._pool is not _pool(len(self._helpers)):
+        if self._pool is not _pool(len(self._helpers)):
             # for the first time, or in a forked child: nobody is there yet
             self._pool = _pool(len(self._helpers))
             self._tickets = new_tickets(len(self._helpers), self._looks)

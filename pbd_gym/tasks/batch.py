@@ -43,6 +43,7 @@ class Batch:
         self.variables = {
             name: np.repeat(value, num_worlds, axis=0) for name, value in fresh.items()
         }
+        self._action_shape = (num_worlds, *task.action_space.shape)
         specs = task.draws.values()
         self._low = np.concatenate([spec.low for spec in specs])
         self._range = np.concatenate([spec.high - spec.low for spec in specs])
@@ -153,12 +154,11 @@ class Batch:
             raise ValueError(f"the actions do not form an array: {error}") from error
         if array.dtype.kind not in "fiu":
             raise TypeError(f"actions have dtype {array.dtype}; expected real numbers")
-        expected = (self.world.num_worlds, *self.task.action_space.shape)
-        if array.shape != expected:
-            raise ValueError(f"actions have shape {array.shape}; expected {expected}")
+        if array.shape != self._action_shape:
+            raise ValueError(f"actions have shape {array.shape}; expected {self._action_shape}")
         if array.dtype != np.float32:
             array = _float64(array)
-        clipped, excess = np.empty(expected, dtype=np.float32), np.empty(len(array))
+        clipped, excess = np.empty(self._action_shape, dtype=np.float32), np.empty(len(array))
         if not clip_actions(np.ascontiguousarray(array), clipped, excess):
             world, index = np.argwhere(~np.isfinite(array))[0]
             raise ValueError(f"action {index} of world {world} is {array[world, index]}")
