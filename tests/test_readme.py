@@ -103,6 +103,7 @@ def test_the_table_of_environments_is_of_today(id):
         ("docs/performance.md", "budget", "budget.md"),
         ("docs/performance.md", "roofline", "roofline.md"),
         ("docs/performance.md", "scaling", "scaling.md"),
+        ("docs/performance.md", "frames", "sb3_frames.md"),
     ],
 )
 def test_tables_are_those_of_the_committed_results(page, mark, results):
