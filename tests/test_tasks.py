@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from episodes import IDS, flat, make, make_vec, nothing, outcomes, parts, pins
+from pbd_gym.envs import PBDEnv
+from pbd_gym.tasks.base import Draw, Start
+from pbd_gym.tasks.pendulum import Pendulum
 
 
 @pytest.mark.parametrize("observation", ["particles", "keypoints"])
@@ -168,3 +171,21 @@ def test_a_body_starts_at_rest_and_stays_so_when_nothing_moves(id, options, spee
         assert np.abs(worlds.v).max() < speed
         # of 1 s: what that speed could drift by [m]
         assert np.abs(worlds.x - start).max() < speed
+
+
+class Still(Pendulum):
+    """A pendulum of which nothing is drawn."""
+
+    def declare_draws(self) -> dict[str, Draw]:
+        return {}
+
+    def start(self, quantities: dict[str, np.ndarray]) -> Start:
+        places = {"angles": 1, "rates": 1, "pivot": 1}
+        return super().start({name: np.zeros((1, size)) for name, size in places.items()})
+
+
+def test_a_task_may_draw_nothing():
+    env = PBDEnv(Still)
+    first, _ = env.reset(seed=0)
+    second, _ = env.reset(seed=1)
+    assert np.array_equal(first, second)

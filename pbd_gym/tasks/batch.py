@@ -44,9 +44,9 @@ class Batch:
             name: np.repeat(value, num_worlds, axis=0) for name, value in fresh.items()
         }
         self._action_shape = (num_worlds, *task.action_space.shape)
-        specs = task.draws.values()
-        self._low = np.concatenate([spec.low for spec in specs])
-        self._range = np.concatenate([spec.high - spec.low for spec in specs])
+        specs, none = task.draws.values(), np.zeros(0)
+        self._low = np.concatenate([none, *[spec.low for spec in specs]])
+        self._range = np.concatenate([none, *[spec.high - spec.low for spec in specs]])
 
     def reset(
         self,
