@@ -106,14 +106,8 @@ def episode(
 def plan_in(env: gymnasium.Env, id: str) -> Policy:
     """Return a policy that plans from the environment's true state, whatever it observes."""
     planner = Planner(env.get_wrapper_attr("task"), planner_settings(id))
-    state, queue = env.get_wrapper_attr("get_state"), list[np.ndarray]()
-
-    def act(observation: Any) -> np.ndarray:
-        if not queue:
-            queue.extend(planner.plan(state()).actions[0, : planner.settings.replan])
-        return queue.pop(0)
-
-    return act
+    state = env.get_wrapper_attr("get_state")
+    return lambda observation: planner.act(state())[0]
 
 
 def draw_tasks(models: Models) -> None:

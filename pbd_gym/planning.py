@@ -171,10 +171,22 @@ class Planner:
         """Forget the last plan and draw candidates from a seed anew."""
         self._random = np.random.default_rng(seed)
         self._mean = np.zeros((self.num_worlds, self.settings.horizon, self._size))
+        self._queue: list[np.ndarray] = []
 
     def forget(self, worlds: np.ndarray) -> None:
         """Plan from nothing in some worlds, given by mask or index: their episodes are new."""
         self._mean[worlds] = 0.0
+        self._queue = []
+
+    def act(self, state: EpisodeState) -> np.ndarray:
+        """Return the next actions (W, size), from a new plan after each `replan` of them.
+
+        Raises:
+            ValueError: If the state is of another task or number of worlds.
+        """
+        if not self._queue:
+            self._queue = list(self.plan(state).actions[:, : self.settings.replan].swapaxes(0, 1))
+        return self._queue.pop(0)
 
     def plan(self, state: EpisodeState) -> Plan:
         """Return the best sequences found from a state of `get_state`, for W worlds.

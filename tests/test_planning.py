@@ -124,6 +124,23 @@ def test_a_guided_plan_promises_no_less_than_the_scripted_policy_earns():
     assert (promised >= earned - 1e-12).all()
 
 
+def test_actions_are_those_of_one_plan_after_the_other():
+    env = begun("PBDPendulum-v0")
+    settings = PlannerSettings(horizon=6, knots=3, candidates=8, iterations=1, replan=2)
+    acting, planning = (Planner(env.unwrapped.task, settings, num_worlds=2) for _ in range(2))
+    for _ in range(3):
+        plan = planning.plan(env.unwrapped.get_state())
+        for step in range(settings.replan):
+            actions = acting.act(env.unwrapped.get_state())
+            assert np.array_equal(actions, plan.actions[:, step])
+            env.step(actions)
+    acting.act(env.unwrapped.get_state())
+    acting.reset()  # forgets what is left of the plan, too
+    planning.reset()
+    state = env.unwrapped.get_state()
+    assert np.array_equal(acting.act(state), planning.plan(state).actions[:, 0])
+
+
 def test_worlds_that_are_forgotten_are_planned_from_nothing():
     env = begun("PBDRope-v0")
     planner, fresh = (Planner(env.task, SMALL, num_worlds=2) for _ in range(2))

@@ -59,7 +59,6 @@ class PlannedPolicy:
         self._seed = seed
         settings = planner_settings(env.spec.id if env.spec else "")
         self._planner = Planner(self._env.task, settings, num_worlds=env.num_envs, seed=seed)
-        self._queue: list[np.ndarray] = []
 
     def __call__(self, observation: Any) -> np.ndarray:
         """Return the next actions (W, action) of the plan."""
@@ -67,11 +66,7 @@ class PlannedPolicy:
         begun = state.elapsed == 0
         if begun.any():
             self._planner.reset(self._seed) if begun.all() else self._planner.forget(begun)
-            self._queue = []
-        if not self._queue:
-            actions = self._planner.plan(state).actions[:, : self._planner.settings.replan]
-            self._queue = list(actions.transpose(1, 0, 2))
-        return self._queue.pop(0)
+        return self._planner.act(state)
 
 
 def _load_model(path: Path, env: VectorEnv) -> Policy:
