@@ -23,9 +23,10 @@ def test_the_hot_loops_over_the_lanes_are_vector_code():
     for kernel in hot:
         (found,) = (row for name, row in counts.items() if name.split(".")[1] == kernel)
         bits, packed, scalar, calls = found
-        # 32 lanes are at least 4 vectors of 8: a scalar loop has as many scalar instructions
+        # 32 lanes are 4 vectors of 8, or 2 of 16 with half the instructions; a scalar loop has as
+        # many scalar ones
         assert bits >= 128, (kernel, found)
-        assert packed >= 32, (kernel, found)
+        assert packed >= min(32, 32 * 256 // bits), (kernel, found)
         assert scalar < packed / 4, (kernel, found)
         assert calls == 0, (kernel, found)
 
