@@ -25,6 +25,10 @@ from pbd_gym.physics.tables import (
     Volumes,
 )
 
+# Particles that share a box where pairs that may meet are looked for: tells the kernels how to fill
+# their scratch, and how much of it there must be.
+PARTICLES_OF_A_BOX = 8
+
 
 class Parameters(NamedTuple):
     """A model as the kernels read it.

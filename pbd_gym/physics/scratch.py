@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pbd_gym.physics.model import Model
+from pbd_gym.physics.parameters import PARTICLES_OF_A_BOX
 
 # Pairs of self-collision that a world can list in a control step, and for each particle of a large
 # cloth. Memory that is never written takes no space.
@@ -43,7 +44,8 @@ def _pairs(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, ...] 
     count = len(model.self_collision.particles)
     capacity = min(count * (count - 1) // 2, max(_PAIRS, _PAIRS_PER_PARTICLE * count))
     pairs = np.zeros((lanes, capacity, 3), dtype=np.int32)
-    return pairs, np.zeros(lanes, dtype=np.int64), np.zeros((1, lanes), dtype=dtype)
+    boxes = _zeros_on_cache_lines((-(-count // PARTICLES_OF_A_BOX), 4 * model.dim * lanes), dtype)
+    return pairs, np.zeros(lanes, dtype=np.int64), np.zeros((1, lanes), dtype=dtype), boxes
 
 
 def _encounters(model: Model, lanes: int, dtype: np.dtype) -> tuple[np.ndarray, ...] | None:

@@ -102,6 +102,34 @@ def test_a_cloth_laid_flat_on_the_table_lies_still():
     np.testing.assert_allclose(state.x[0], state.model.positions, atol=1e-3)
 
 
+def cloud(strangers):
+    """60 particles at rest on a grid, numbered after some others far away that meet nobody."""
+    builder = ModelBuilder(3)
+    if strangers:
+        builder.add_particles([(100.0 + i, 0.0, 0.0) for i in range(strangers)], 0.1)
+    grid = np.stack(np.unravel_index(np.arange(60), (5, 4, 3)), axis=1)
+    builder.add_particles(0.3 * grid, 0.1)
+    builder.set_self_collision(np.arange(strangers + 60), 0.1)
+    return world(builder.build(gravity=(0, 0, 0)))
+
+
+@pytest.mark.parametrize("strangers", [1, 5])
+def test_which_pairs_meet_does_not_depend_on_who_else_is_compared(strangers):
+    # strangers move all others on to other blocks, whose boxes are compared first
+    random = np.random.default_rng(4)
+    x, v = random.uniform(0.0, 0.8, (60, 3)), random.normal(scale=2.0, size=(60, 3))
+    runs = []
+    for count in (0, strangers):
+        state = cloud(count)
+        state.x[0, count:], state.v[0, count:] = x, v
+        for _ in range(5):
+            state.step(1 / 30, 20)
+        runs.append((state.x[0, count:].copy(), state.v[0, count:].copy()))
+    np.testing.assert_array_equal(runs[1], runs[0])
+    # without meeting anybody they would have flown on
+    assert np.abs(runs[0][1] - v).max() > 0.1
+
+
 def test_two_particles_that_fly_at_each_other_do_not_pass():
     distance = 0.024
     builder = ModelBuilder(3)

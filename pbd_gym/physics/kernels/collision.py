@@ -1,8 +1,7 @@
 """Self-collision: particles of one body keep their distance.
 
-Pairs that may meet are found once per control step by comparing all with all, in vector registers:
-up to some thousand particles that is quicker than a grid, whose cells differ from world to world.
-Contacts are solved in every substep, world by world, in the order in which they were found.
+Pairs that may meet are found once per control step, see pairs.py. Contacts are solved in every
+substep, world by world, in the order in which they were found.
 """
 
 import numpy as np
@@ -12,84 +11,11 @@ from .forces import SELF_COLLISION, note_contact, note_normal
 from .layout import DIM, LANES, POSITION, START, VELOCITY
 from .masses import in_lane, inverse_mass_of
 
-# Particles built closer to each other than this many collision distances are neighbours in the
-# body: its own constraints hold them apart.
-_NEIGHBOURHOOD = 3.0
 # Speed at which overlapping particles are let apart [m/s].
 _PARTING_SPEED = 0.03
 # Force that presses touching particles together, for friction, in units of a particle's weight:
 # what pushes them apart is limited, so the solver does not know it.
 _PRESSURE = 2.0
-
-
-@kernel
-def find_pairs(work, masses, collision, found, timing):
-    """List, for every lane, the pairs that can come into contact within the control step.
-
-    found: pairs (LANES, capacity, 3), their number (LANES,) and scratch (1, LANES). There is room
-    for all pairs of 1024 particles; of more, the pairs that are left out are the last ones.
-    """
-    if collision is None:
-        return
-    pairs, counts, scratch = found
-    particles, rest, distance = collision.particles, masses.positions, collision.distance
-    apart = distance * work.dtype.type(_NEIGHBOURHOOD)
-    reach = distance + timing.gravity * timing.dt * timing.dt
-    excess = row(scratch, 0)
-    for lane in range(LANES):
-        counts[lane] = 0
-    for first in range(particles.shape[0]):
-        a = row(work, particles[first])
-        for second in range(first + 1, particles.shape[0]):
-            b = row(work, particles[second])
-            if _can_meet(a, b, excess, reach, timing.dt):
-                i, j = particles[first], particles[second]
-                if _far_at_rest(rest, i, j, apart):
-                    _list_pair(i, j, excess, pairs, counts)
-
-
-@kernel
-def _can_meet(a, b, excess, reach, dt):
-    """Tell whether two particles can meet within dt in any lane: where `excess` [m2] is negative.
-
-    They can where |x_a - x_b| < reach + |v_a - v_b| dt, and (p + q)^2 <= 3/2 p^2 + 3 q^2 saves the
-    root; what it adds at rest allows for velocities that change.
-    """
-    real = type(reach)
-    zero, near = real(0), False
-    within, spread = real(1.5) * reach * reach, real(3) * dt * dt
-    for lane in range(LANES):
-        square, travel = zero, zero
-        for k in range(DIM):
-            at = k * LANES + lane
-            delta = a[POSITION + at] - b[POSITION + at]
-            motion = a[VELOCITY + at] - b[VELOCITY + at]
-            square += delta * delta
-            travel += motion * motion
-        beyond = square - within - spread * travel
-        excess[lane] = beyond
-        near |= beyond < zero
-    return near
-
-
-@kernel
-def _far_at_rest(rest, i, j, apart):
-    """Tell whether two particles were built at least `apart` from each other."""
-    square = type(apart)(0)
-    for k in range(DIM):
-        square += (rest[i, k] - rest[j, k]) * (rest[i, k] - rest[j, k])
-    return square >= apart * apart
-
-
-@kernel
-def _list_pair(i, j, excess, pairs, counts):
-    """Add a pair to the lists of the lanes in which it can meet."""
-    zero = type(excess[0])(0)
-    for lane in range(LANES):
-        if excess[lane] < zero and counts[lane] < pairs.shape[1]:
-            pairs[lane, counts[lane], 0] = i
-            pairs[lane, counts[lane], 1] = j
-            counts[lane] += 1
 
 
 @kernel
@@ -111,7 +37,7 @@ def collide_with_self(work, masses, collision, found, h, iteration, forces):
     """
     if collision is None:
         return
-    pairs, counts, _ = found
+    pairs, counts = found[0], found[1]
     zero = work.dtype.type(0)
     distance = collision.distance
     parting = work.dtype.type(_PARTING_SPEED) * h
@@ -156,7 +82,7 @@ def rub_against_self(work, masses, collision, found, h, gravity, forces):
     """
     if collision is None:
         return
-    pairs, counts, _ = found
+    pairs, counts = found[0], found[1]
     zero, one = work.dtype.type(0), work.dtype.type(1)
     held = collision.friction * work.dtype.type(_PRESSURE) * gravity * h
     for lane in range(LANES):

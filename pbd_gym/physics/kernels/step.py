@@ -5,7 +5,7 @@ from ..tickets import are_more, finish, is_done, take
 from .attachment import project_attachments
 from .chain import project_chain_velocities, project_chains, project_chains_from_start
 from .collider import collide_with_shapes
-from .collision import collide_with_self, find_pairs, rub_against_self
+from .collision import collide_with_self, rub_against_self
 from .contact import collide_with_walls, read_velocities
 from .encounter import collide_with_others, part_from_others, unsettle
 from .fallback import (
@@ -25,6 +25,7 @@ from .limit import project_limits
 from .masses import inverse_mass_of, is_grabbed
 from .matching import match_shapes
 from .meeting import list_encounters
+from .pairs import find_pairs
 from .rod import project_rods
 from .rope import finish_ropes, project_ropes
 from .sweep import (
