@@ -3,14 +3,17 @@
 The bare `World.step` of the driven scenes. First the size of the body grows, in as many worlds as
 make about the same number of particles, on one thread; then the number of worlds, on one thread and
 on two. All settings of a series have their turn in each round; as other processes can only slow a
-step down, the fastest round counts.
+step down, the fastest round counts. What two threads can be worth on the machine is told by two
+that share nothing, each with worlds of its own.
 """
 
 from __future__ import annotations
 
+import statistics
 import sys
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +27,7 @@ _CLOTHS = (4, 6, 8, 12, 16, 24, 32)
 _PARTICLES = 16_384
 _WORLDS = (1, 4, 16, 64, 256, 1024, 4096, 16_384)
 _FRAMES = 30
+_APART = 1024  # worlds of each of two threads that share nothing
 _COLOURS = {"rope": "#0072b2", "cloth": "#d55e00"}
 
 
@@ -31,9 +35,11 @@ class Row(NamedTuple):
     """One setting.
 
     Attributes:
-        series: What grows: "particles", "worlds", or "threads" at several numbers of worlds.
+        series: What grows: "particles", "worlds", or "threads" at several numbers of worlds;
+            "apart" is two threads that share nothing.
         scene: "rope" or "cloth".
         particles: Of a world.
+        constraints: Of a world: links, distances and bends.
         substeps: Of a control step.
         worlds: That are stepped.
         threads: On which.
@@ -45,6 +51,7 @@ class Row(NamedTuple):
     series: str
     scene: str
     particles: int
+    constraints: int
     substeps: int
     worlds: int
     threads: int
@@ -75,11 +82,42 @@ def measure(
     rows = []
     for number, spread in spreads.items():
         scene, worlds, threads = cases[number]
-        particles, name = scene.model.num_particles, scene.name.split()[0]
-        share = 1e9 / (worlds * particles * scene.substeps)
+        share = 1e9 / (worlds * scene.model.num_particles * scene.substeps)
         costs = (share * value for value in spread)
-        rows.append(Row(series, name, particles, scene.substeps, worlds, threads, *costs))
+        rows.append(_row(series, scene, worlds, threads, *costs))
     return rows
+
+
+def _row(
+    series: str, scene: Driven, worlds: int, threads: int, median: float, least: float, most: float
+) -> Row:
+    model, name = scene.model, scene.name.split()[0]
+    constraints = len(model.links()[0]) + len(model.distances.rest) + len(model.bends.triples)
+    size = model.num_particles, constraints, scene.substeps
+    return Row(series, name, *size, worlds, threads, median, least, most)
+
+
+def measure_apart(scene: Driven, rounds: int, seconds: float) -> Row:
+    """Measure two threads that share nothing, each with worlds of its own."""
+    steps = [_steps(scene, _APART, 1) for _ in range(2)]
+    costs = []
+    with ThreadPoolExecutor(2) as pool:
+        count = _count_within(steps[0], seconds)
+        for _ in range(rounds):
+            begin = time.perf_counter()
+            list(pool.map(lambda step: [step(k) for k in range(count)], steps))
+            costs.append(time.perf_counter() - begin)
+    share = 1e9 / (2 * count * _APART * scene.model.num_particles * scene.substeps)
+    spread = statistics.median(costs), min(costs), max(costs)
+    return _row("apart", scene, 2 * _APART, 2, *(share * value for value in spread))
+
+
+def _count_within(step: Callable[[int], None], seconds: float) -> int:
+    """Return how many steps take about so long, no fewer than 8."""
+    begin = time.perf_counter()
+    for k in range(8):
+        step(k)
+    return max(8, round(8 * seconds / (time.perf_counter() - begin)))
 
 
 def _steps(scene: Driven, worlds: int, threads: int) -> Callable[[int], None]:
@@ -96,17 +134,23 @@ def report(rows: Sequence[Row]) -> str:
         _growing_bodies([row for row in rows if row.series == "particles"]),
         "The same for more and more worlds; in brackets how many times faster two threads are than "
         "one, by the clock on the wall:",
-        _growing_batches([row for row in rows if row.series != "particles"]),
+        _growing_batches([row for row in rows if row.series in ("worlds", "threads")]),
+        _sharing_nothing(rows),
     ]
-    return "\n\n".join(parts)
+    return "\n\n".join(filter(None, parts))
 
 
 def _growing_bodies(rows: Sequence[Row]) -> str:
     lines = [
-        [row.scene, str(row.particles), str(row.worlds), str(row.substeps), f"{row.least:.2f}"]
+        [
+            row.scene, str(row.particles), f"{row.constraints / row.particles:.2f}",
+            str(row.worlds), str(row.substeps), f"{row.least:.2f}",
+            f"{row.least * row.particles / row.constraints:.2f}",
+        ]
         for row in rows
-    ]
-    return table(["scene", "particles", "worlds", "substeps", "cost [ns]"], lines)
+    ]  # fmt: skip
+    head = ["scene", "particles", "constraints each", "worlds", "substeps", "cost [ns]"]
+    return table([*head, "of a constraint [ns]"], lines)
 
 
 def _growing_batches(rows: Sequence[Row]) -> str:
@@ -121,6 +165,26 @@ def _growing_batches(rows: Sequence[Row]) -> str:
             line.append(f"{cost['worlds', scene, worlds, 1]:.2f}{gain}")
         lines.append(line)
     return table(["worlds", *(f"{name}, {count} particles [ns]" for name, count in scenes)], lines)
+
+
+def _sharing_nothing(rows: Sequence[Row]) -> str:
+    """Say what two threads are worth where each has worlds of its own."""
+    parts = []
+    for row in rows:
+        if row.series == "apart":
+            one = next(
+                other.least
+                for other in rows
+                if (other.series, other.scene, other.worlds, other.threads)
+                == ("threads", row.scene, _APART, 1)
+            )
+            parts.append(f"{one / row.least:.2f} (a {row.scene})")
+    if not parts:
+        return ""
+    return (
+        f"Two threads that share nothing, {_APART} worlds each, are together {' and '.join(parts)} "
+        "times as fast as one alone: more is not to be had on this machine."
+    )
 
 
 def draw_figure(rows: Sequence[Row], path: Path) -> bool:
@@ -164,6 +228,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows += measure("worlds", alone, options.rounds, options.seconds)
         both = [(scene, count, threads) for count in worlds if count > 32 for threads in (1, 2)]
         rows += measure("threads", both, options.rounds, options.seconds)
+        if not options.quick:
+            rows.append(measure_apart(scene, options.rounds, options.seconds))
     write(options.out, "scaling", rows, report(rows))
     draw(draw_figure, rows, options.out / "scaling.png")
     return 0
