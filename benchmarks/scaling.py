@@ -183,7 +183,7 @@ def _sharing_nothing(rows: Sequence[Row]) -> str:
         return ""
     return (
         f"Two threads that share nothing, {_APART} worlds each, are together {' and '.join(parts)} "
-        "times as fast as one alone: more is not to be had on this machine."
+        "times as fast as one alone: what the machine had to give at that time."
     )
 
 
