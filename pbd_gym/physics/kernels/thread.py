@@ -18,13 +18,17 @@ def limit_strains(work, masses, chains, forces):
     offsets, particles = chains.offsets, chains.particles
     greatest = chains.greatest
     count = offsets.shape[0] - 1
+    shortened = False
     for turn in range(2 * count):
         # there and back, so that no thread is always the last
         chain = turn if turn < count else 2 * count - 1 - turn
+        if turn == count and not shortened:
+            return  # nothing has moved: no link is too long on the way back either
         for entry in range(offsets[chain], offsets[chain + 1] - 1):
             i, j = particles[entry], particles[entry + 1]
             a, b, longest = row(work, i), row(work, j), greatest[entry]
             if longest < np.inf and _is_longer(a, b, longest * longest):
+                shortened = True
                 w_a, w_b = inverse_mass_of(masses, i), inverse_mass_of(masses, j)
                 _shorten(a, b, w_a, w_b, longest, force_row(forces, CHAINS, entry))
 
