@@ -103,6 +103,17 @@ def test_a_benchmark_skips_what_is_done_and_goes_on_where_it_was_stopped(tmp_pat
     assert read_scores(results / "baselines.csv")[1] == scores[1]
 
 
+def test_imitation_is_asked_for_where_it_is_possible(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(benchmark, "run_script", lambda script, quiet: asked.append(script))
+    options = ["--env", "PBDTriplePendulum-v0", "PBDRope-v0", "--policy", "imitate", "--seeds", "1"]
+    options += ["--log-dir", str(tmp_path / "runs"), "--results", str(tmp_path)]
+    assert benchmark.main(options) == 0
+    (script,) = asked
+    assert script[0].endswith("imitate.py")
+    assert script[script.index("--env") + 1] == "pbd_gym:PBDTriplePendulum-v0"
+
+
 def test_jobs_at_once_give_the_same_table(tmp_path):
     tables = []
     for jobs in ("1", "2"):

@@ -35,7 +35,9 @@ ENVIRONMENTS = (
     "PBDRope-v0",
     "PBDCloth-v0",
 )
-POLICIES = (*BASELINES, *ALGORITHMS)
+IMITATED = ENVIRONMENTS[:3]  # what train/imitate.py can plan and regulate
+TRAINED = (*ALGORITHMS, "imitate")
+POLICIES = (*BASELINES, *TRAINED)
 SCRIPTS = Path(__file__).parent
 MARKS = "<!-- baselines -->", "<!-- /baselines -->"
 
@@ -125,6 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for env in options.env
         for policy in options.policy
         for seed in range(options.seeds)
+        if policy != "imitate" or env in IMITATED
     ]
     try:
         if options.readme is not None:
@@ -193,12 +196,15 @@ def command(cell: Cell, options: argparse.Namespace) -> list[str]:
         file.parent.mkdir(exist_ok=True)
         script = [str(SCRIPTS / "evaluate.py"), cell.policy, "--env", env, "--json", str(file)]
         return [*script, "--episodes", str(episodes), "--seed", str(seed)]
-    script = [str(SCRIPTS / "train.py"), "--no-video"]
     run = RunDirectory(options.log_dir / f"{cell.env}-{cell.policy}-{cell.seed}")
+    new = ["--no-video", "--env", env, "--seed", str(cell.seed), "--log-dir", str(options.log_dir)]
+    new += ["--overwrite"] if run.config.exists() else []
+    if cell.policy == "imitate":
+        return [str(SCRIPTS / "imitate.py"), *new]
+    script = [str(SCRIPTS / "train.py")]
     if run.checkpoint.exists():
-        return [*script, "--resume", str(run.path)]
-    script += ["--env", env, "--algo", cell.policy, "--seed", str(cell.seed)]
-    script += ["--log-dir", str(options.log_dir)] + (["--overwrite"] if run.config.exists() else [])
+        return [*script, "--no-video", "--resume", str(run.path)]
+    script += [*new, "--algo", cell.policy]
     if options.total_timesteps is not None:
         script += ["--total-timesteps", str(options.total_timesteps)]
     return script
@@ -276,7 +282,7 @@ def _first(points: Sequence[Point], rate: float) -> tuple[float, float]:
 
 
 def _curves(env: str, done: Sequence[Cell], log_dir: Path) -> Iterator[tuple[str, list[Any]]]:
-    for algorithm in ALGORITHMS:
+    for algorithm in TRAINED:
         runs = [cell for cell in done if (cell.env, cell.policy) == (env, algorithm)]
         tables = [RunDirectory(result_of(run, log_dir).parent).curve_table for run in runs]
         if tables:

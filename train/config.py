@@ -18,6 +18,16 @@ from pbd_gym.hyperparams import SETUP, check_hyperparameters, load_hyperparamete
 
 DEFAULT_ENV = "pbd_gym:PBDRope-v0"
 
+# What a wrong setting may raise in building the worlds and the model.
+SETTING_ERRORS = (
+    ValueError,
+    TypeError,
+    AssertionError,
+    OSError,
+    ImportError,
+    gymnasium.error.Error,
+)
+
 
 @dataclass(frozen=True)
 class TrainingConfig:

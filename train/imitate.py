@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 
 from arguments import StoreKeyValues, sparse_parser
-from config import save_config
+from config import SETTING_ERRORS, save_config
+from finishing import finish
 from pbd_gym.tasks.pendulum import Pendulum
 from run_directory import RunDirectory
-from train import SETTING_ERRORS, finish
 from video import check_video
 
 if TYPE_CHECKING:  # torch takes seconds to import, which --help and wrong options need not wait for
@@ -29,7 +29,7 @@ DEFAULT_ENV = "pbd_gym:PBDTriplePendulum-v0"
 EXAMPLES = """\
 examples:
   python train/imitate.py
-      three links, in some two minutes
+        three links, in some two minutes
   python train/imitate.py --env pbd_gym:PBDDoublePendulum-v0 --seed 1
   python train/imitate.py --env-kwargs gravity:1.62 --no-video
   python train/evaluate.py runs/PBDTriplePendulum-v0-imitate-0
@@ -58,6 +58,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     add("--seed", type=int, help="of first guesses, network and worlds (default: 0)")
     add("--rounds", type=int, metavar="N", help="of motion and fitting (default: 12)")
+    add("--updates", type=int, metavar="N", help="of the network in a round (default: 600)")
     add("--num-envs", type=int, metavar="N", help="worlds that move at once (default: 512)")
     add("--candidates", type=int, metavar="N", help="swing-ups that are tried (default: 16)")
     add("--iterations", type=int, metavar="N", help="improvements of each (default: 120)")
@@ -123,7 +124,7 @@ def pendulum(options: dict[str, Any]) -> tuple[Pendulum, str]:
     """
     env_id = options.get("env", DEFAULT_ENV)
     env = gymnasium.make(env_id, **options.get("env_kwargs", {}))
-    task = env.unwrapped.task  # type: ignore[attr-defined]
+    task = getattr(env.unwrapped, "task", None)
     env.close()
     if not isinstance(task, Pendulum):
         raise ValueError(f"{env_id} is no pendulum, and only those can be planned and regulated")

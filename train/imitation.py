@@ -30,7 +30,9 @@ class ImitationSettings:
     Attributes:
         worlds: Pendulums that move at once.
         rounds: Of motion and fitting.
-        steps: Of each round but the first, which is one episode long [control steps].
+        first: Control steps of the first round, enough for the whole motion.
+        steps: Control steps of every other round.
+        lives: Least and greatest length of an episode, drawn for each [control steps].
         led: Rounds until the share of episodes that the regulator leads has fallen to a tenth.
         updates: Of the network in each round.
         batch_size: States in each update.
@@ -41,18 +43,15 @@ class ImitationSettings:
 
     worlds: int = 512
     rounds: int = 12
+    first: int = 350
     steps: int = 100
+    lives: tuple[int, int] = (250, 400)
     led: int = 10
     updates: int = 600
     batch_size: int = 2048
     learning_rate: float = 2e-3
     hidden: int = 126
     lost: float = 30.0
-
-    @property
-    def first(self) -> int:
-        """Steps of the first round."""
-        return 350
 
     @property
     def timesteps(self) -> int:
@@ -209,11 +208,11 @@ class Imitation:
         return Examples(*map(np.concatenate, zip(*seen, strict=True)))
 
     def _begin(self, worlds: np.ndarray, led: float) -> None:
-        """Begin new episodes in some worlds, (W,) bool: swing-ups and 1 to 4 s at the top."""
+        """Begin new episodes in some worlds, (W,) bool, a share of them led."""
         count = int(worlds.sum())
         self._states[worlds] = self._model.draw(count, self._random)
         self._ages[worlds] = 0
-        self._lives[worlds] = self._random.integers(250, 400, count)
+        self._lives[worlds] = self._random.integers(*self.settings.lives, count)
         self._led[worlds] = self._random.random(count) < led
         self._noise[worlds] = self._random.choice(_NOISE, count)
 

@@ -33,23 +33,15 @@ class Settings(NamedTuple):
     imitation: ImitationSettings
 
 
-class Interrupted(Exception):  # noqa: N818, no error
-    """Ctrl-C was pressed."""
-
-
 def new_settings(options: dict[str, Any]) -> tuple[TrainingConfig, Settings]:
     """Complete what the user gave with the defaults.
 
     The config tells what the saved model is: a PPO that could be trained on, with little noise.
     """
     options = dict(options)
-    search, imitation = SwingUpSettings(), ImitationSettings()
-    changes = {name: options.pop(name) for name in ("candidates", "iterations") if name in options}
-    rounds, worlds = options.pop("rounds", imitation.rounds), options.pop("num_envs", 512)
-    for name, value in (changes | {"rounds": rounds, "num_envs": worlds}).items():
-        check_at_least(name, value, 1)
-    search = SwingUpSettings(**changes)
-    imitation = ImitationSettings(rounds=rounds, worlds=worlds)
+    planned = _take(options, candidates="candidates", iterations="iterations")
+    imitated = _take(options, rounds="rounds", updates="updates", num_envs="worlds")
+    search, imitation = SwingUpSettings(**planned), ImitationSettings(**imitated)
     units = imitation.hidden + 2
     policy = f"dict(net_arch={{'pi': [{units}, {units}], 'vf': [64, 64]}}, activation_fn=nn.SiLU, "
     policy += "log_std_init=-5.0)"
@@ -62,6 +54,14 @@ def new_settings(options: dict[str, Any]) -> tuple[TrainingConfig, Settings]:
         **options,
     )
     return config, Settings(search, imitation)
+
+
+def _take(options: dict[str, Any], **names: str) -> dict[str, Any]:
+    """Take some options out and return them by the names of settings; all count something."""
+    taken = {setting: options.pop(name) for name, setting in names.items() if name in options}
+    for setting, value in taken.items():
+        check_at_least(setting, value, 1)
+    return taken
 
 
 class ImitationTraining:
@@ -113,7 +113,7 @@ class ImitationTraining:
                     self._model, regulator, self._settings.imitation, self._random
                 )
                 self._imitate(imitation, run)
-            except Interrupted:
+            except KeyboardInterrupt:
                 finished = False
         if imitation is not None and imitation.student is not None:
             self._save(imitation, run)
@@ -150,7 +150,7 @@ class ImitationTraining:
 
             def progress(loss: float) -> None:
                 self._check()
-                success = [point.success_rate for point in self.curve.evaluations[-1:]]
+                success = "".join(f"{x.success_rate:.2f}" for x in self.curve.evaluations[-1:])
                 bar.set_postfix({"loss": f"{loss:.2g}", "success": success}, refresh=False)
                 bar.update()
 
@@ -168,9 +168,9 @@ class ImitationTraining:
         return tqdm(desc=title, total=total, dynamic_ncols=True, mininterval=interval)
 
     def _check(self) -> None:
-        """Raise Interrupted after Ctrl-C."""
+        """Raise KeyboardInterrupt where no file is half written, if Ctrl-C has been pressed."""
         if self._interrupt.requested:
-            raise Interrupted
+            raise KeyboardInterrupt
 
     def _act(self, observations: np.ndarray) -> np.ndarray:
         return self._ppo.predict(observations, deterministic=True)[0]

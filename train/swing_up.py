@@ -65,7 +65,7 @@ class SwingUpSearch:
     """Finds swing-ups of a pendulum that hangs at rest; see `SwingUpSettings`.
 
     Attributes:
-        motions: The candidates as they are, best first only after `best`.
+        motions: The candidates as they are by now.
         costs: Of each (N,).
     """
 

@@ -6,29 +6,26 @@ Everything a run produces is in one folder, runs/<env>-<algo>-<seed>.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import gymnasium
-
 from arguments import StoreKeyValues, sparse_parser
 from config import (
     DEFAULT_ENV,
+    SETTING_ERRORS,
     TrainingConfig,
     installed_versions,
     load_config,
     new_config,
     save_config,
 )
+from finishing import finish
 from pbd_gym.hyperparams import ALGORITHMS
-from policies import make_policy
-from rollouts import make_batch, report, run_episodes
 from run_directory import RunDirectory
-from video import check_video, record_video
+from video import check_video
 
 if TYPE_CHECKING:  # torch takes seconds to import, which --help and wrong options need not wait for
     from training import Training
@@ -57,16 +54,6 @@ Checkpoints and models are pickles: loading one can run any code, so load only y
 
 # The rest of a run's settings is fixed when it starts.
 RESUME_OPTIONS = ("resume", "total_timesteps", "video")
-
-# What a wrong setting may raise in building the worlds and the model.
-SETTING_ERRORS = (
-    ValueError,
-    TypeError,
-    AssertionError,
-    OSError,
-    ImportError,
-    gymnasium.error.Error,
-)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -227,24 +214,6 @@ def resume_run(given: dict[str, Any]) -> tuple[RunDirectory, TrainingConfig, Tra
             f"{run.path} has already, got {config.total_timesteps}"
         )
     return run, config, Training(config, checkpoint)
-
-
-def finish(run: RunDirectory, config: TrainingConfig, *, video: bool) -> None:
-    """Evaluate the final policy over 100 fresh episodes, and film it."""
-    from training import independent_seeds
-
-    seed = independent_seeds(config.seed)["final"]
-    env = make_batch(config.env, 100, config.env_kwargs)
-    policy = make_policy(str(run.chosen_model), env)
-    summary = run_episodes(env, policy, seed=seed).summary()
-    env.close()
-    summary |= {"env": config.env, "policy": run.chosen_model.name, "seed": seed}
-    run.evaluation.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    print(report(summary, f"{run.path.name}, {run.chosen_model.name}"))
-    if video:
-        record_video(run.video, config.env, str(run.chosen_model), config.env_kwargs, seed=seed)
-    files = (run.chosen_model, run.curve_picture, *([run.video] if video else []))
-    print("\n".join(str(file) for file in files))
 
 
 if __name__ == "__main__":
