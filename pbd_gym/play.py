@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from pbd_gym.hyperparams import ALGORITHMS
 from pbd_gym.rendering import Renderer
 from pbd_gym.rendering.palette import LIGHT, Colour
 
@@ -253,7 +254,7 @@ def load_agent(name: str, algo: str, env_id: str) -> tuple[Action, dict[str, Any
 
     Args:
         name: "scripted", the task's own policy, or the path of a model of stable-baselines3.
-        algo: Of that model, "ppo" or "sac".
+        algo: Of that model, "ppo", "sac" or "crossq".
         env_id: Of the environment.
 
     Raises:
@@ -292,7 +293,7 @@ def main(arguments: list[str] | None = None) -> int:
         help="who can take over: scripted, or the path of a model that stable-baselines3 has saved "
         "(load only your own, for it is unpickled)",
     )
-    parser.add_argument("--algo", choices=("ppo", "sac"), default="ppo", help="of that model")
+    parser.add_argument("--algo", choices=ALGORITHMS, default="ppo", help="of that model")
     parser.add_argument("--size", type=int, default=640, help="side of the picture [pixels]")
     parser.add_argument("--seed", type=int, default=0, help="of the first episode")
     options = parser.parse_args(arguments)

@@ -68,7 +68,7 @@ def load_policy(
 
     Args:
         path: Of the model; load only your own, for it is unpickled.
-        algo: "ppo" or "sac".
+        algo: "ppo", "sac" or "crossq".
         id: Of the environment.
 
     Returns:
@@ -79,9 +79,9 @@ def load_policy(
         FileNotFoundError: If there is no such model.
         ValueError: If the model was trained on something else.
     """
-    import stable_baselines3
+    from pbd_gym.hyperparams import algorithm_class
 
-    model = getattr(stable_baselines3, algo.upper()).load(path, device="cpu")
+    model = algorithm_class(algo).load(path, device="cpu")
     seen = []
     for kind in ("particles", "keypoints"):
         env = gymnasium.make(id, observation=kind)

@@ -18,6 +18,7 @@ SCRIPT = Path(__file__).parents[1] / "train/train.py"
 SMALL = {
     "ppo": ["n_steps:8", "batch_size:16", "n_epochs:2", "policy_kwargs:{'net_arch':[8]}"],
     "sac": ["learning_starts:40", "gradient_steps:2", "buffer_size:500", "batch_size:16"],
+    "crossq": ["learning_starts:40", "gradient_steps:2", "buffer_size:500", "batch_size:16"],
 }
 
 

@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3")
+pytest.importorskip("sb3_contrib")
 sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
 
+from sb3_contrib import CrossQ
 from stable_baselines3 import PPO, SAC
 
 import evaluate
@@ -27,7 +29,7 @@ from files import write_atomically
 from runs import SCRIPT, assert_same_run, interrupt_after, small_run
 
 
-@pytest.mark.parametrize(("algo", "algorithm"), [("ppo", PPO), ("sac", SAC)])
+@pytest.mark.parametrize(("algo", "algorithm"), [("ppo", PPO), ("sac", SAC), ("crossq", CrossQ)])
 def test_an_interrupted_training_resumes_to_the_same_bits(
     tmp_path, monkeypatch, capsys, algo, algorithm
 ):

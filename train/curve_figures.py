@@ -12,7 +12,7 @@ from curves import Point
 from files import write_atomically
 from scores import Score
 
-_COLORS = {"ppo": "#0072b2", "sac": "#d55e00", "imitate": "#cc79a7"}
+_COLORS = {"ppo": "#0072b2", "sac": "#d55e00", "crossq": "#56b4e9", "imitate": "#cc79a7"}
 _LEVELS = {"scripted": ("#009e73", "--"), "planner": ("#7f5aa2", ":"), "random": ("#888888", "-.")}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 
-from pbd_gym.hyperparams import algorithm_class
+from pbd_gym.hyperparams import ALGORITHMS, algorithm_class
 from pbd_gym.planning import Planner, planner_settings
 
 Policy = Callable[[Any], np.ndarray]
@@ -94,10 +94,10 @@ def _shape(space: spaces.Space) -> Any:
 
 
 def _saved_algorithm(path: Path) -> str:
-    """Tell PPO from SAC by the policy class named in the file, without unpickling anything."""
+    """Tell the algorithm by the policy class named in the file, without unpickling anything."""
     try:
         with zipfile.ZipFile(path) as archive:
             module = json.loads(archive.read("data"))["policy_class"]["__module__"]
     except (zipfile.BadZipFile, KeyError, ValueError) as error:
         raise ValueError(f"{path} is no model saved by stable-baselines3") from error
-    return "sac" if ".sac." in module else "ppo"
+    return next((name for name in ALGORITHMS if f".{name}." in module), "ppo")

@@ -1,4 +1,4 @@
-"""Train PPO or SAC on an environment of pbd_gym, from the first step to the video.
+"""Train PPO, SAC or CrossQ on an environment of pbd_gym, from the first step to the video.
 
 Everything a run produces is in one folder, runs/<env>-<algo>-<seed>.
 """

@@ -12,7 +12,7 @@ import inspect
 from pathlib import Path
 from typing import Any
 
-ALGORITHMS = ("ppo", "sac")
+ALGORITHMS = ("ppo", "sac", "crossq")
 
 # Entries that set up the training; all others are arguments of the algorithm.
 SETUP = frozenset({"n_timesteps", "n_envs", "env_kwargs", "train_env_kwargs"})
@@ -42,7 +42,7 @@ def load_hyperparameters(algo: str, env_id: str) -> dict[str, Any]:
     """Read the settings of one environment, as they stand in the file.
 
     Args:
-        algo: "ppo" or "sac".
+        algo: One of `ALGORITHMS`.
         env_id: Environment id, with or without its module: "pbd_gym:PBDRope-v0".
 
     Returns:
@@ -61,8 +61,17 @@ def load_hyperparameters(algo: str, env_id: str) -> dict[str, Any]:
 
 
 def algorithm_class(algo: str) -> type[Any]:
-    """Return stable-baselines3's class for an algorithm's name."""
+    """Return the class of stable-baselines3 or sb3-contrib for an algorithm's name.
+
+    Raises:
+        ValueError: If `algo` is not one of `ALGORITHMS`.
+        ImportError: If the package that has it is not installed.
+    """
     check_algorithm(algo)
+    if algo == "crossq":
+        from sb3_contrib import CrossQ
+
+        return CrossQ
     from stable_baselines3 import PPO, SAC
 
     return {"ppo": PPO, "sac": SAC}[algo]
