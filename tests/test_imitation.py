@@ -128,7 +128,7 @@ def test_a_run_leaves_model_curve_and_evaluation(tmp_path, capsys):
     run = RunDirectory(tmp_path / "PBDPendulum-v0-imitate-0")
     names = {file.name for file in run.path.iterdir()}
     curve = {"learning_curve.png", "learning_curve.csv"}
-    assert names == {"config.yml", "model.zip", "evaluation.json"} | curve
+    assert names == {"config.yml", "imitation.yml", "model.zip", "evaluation.json"} | curve
     assert "the regulator succeeds in 100% of episodes" in capsys.readouterr().out
     point = read_csv(run.curve_table).evaluations[-1]
     assert point.timesteps > 16 * 450  # what was planned and imitated

@@ -29,15 +29,16 @@ DEFAULT_ENV = "pbd_gym:PBDTriplePendulum-v0"
 EXAMPLES = """\
 examples:
   python train/imitate.py
-        three links, in some two minutes
+        three links, in little more than a minute
   python train/imitate.py --env pbd_gym:PBDDoublePendulum-v0 --seed 1
-  python train/imitate.py --env-kwargs gravity:1.62 --no-video
+  python train/imitate.py --seconds 3 --no-video
+      a slower swing-up
   python train/evaluate.py runs/PBDTriplePendulum-v0-imitate-0
 
 files in the run's folder:
-  config.yml           all settings and versions      model.zip            PPO of stable-baselines3
-  learning_curve.png   and .csv                       evaluation.json      policy, fresh episodes
-  video.mp4            policy at work
+  config.yml           model and versions             imitation.yml        how it was made
+  model.zip            PPO of stable-baselines3       learning_curve.png   and .csv
+  evaluation.json      policy, fresh episodes         video.mp4            policy at work
 
 Ctrl-C ends the training and keeps the policy that is there. Models are pickles: loading one can run
 any code, so load only your own.
@@ -62,6 +63,7 @@ def build_parser() -> argparse.ArgumentParser:
     add("--num-envs", type=int, metavar="N", help="worlds that move at once (default: 512)")
     add("--candidates", type=int, metavar="N", help="swing-ups that are tried (default: 16)")
     add("--iterations", type=int, metavar="N", help="improvements of each (default: 120)")
+    add("--seconds", type=float, metavar="S", help="length of the swing-up (default: 2.5)")
     add("--eval-episodes", type=int, metavar="N", help="per evaluation (default: 100)")
     add(
         "--video",
@@ -113,6 +115,7 @@ def start_run(given: dict[str, Any], film: bool) -> tuple[RunDirectory, Imitatio
     training = ImitationTraining(config, task, settings)
     run.create_anew()
     save_config(run.config, config)
+    settings.save(run.imitation)
     return run, training
 
 

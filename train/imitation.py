@@ -30,9 +30,9 @@ class ImitationSettings:
     Attributes:
         worlds: Pendulums that move at once.
         rounds: Of motion and fitting.
-        first: Control steps of the first round, enough for the whole motion.
+        first: Control steps of the first round, enough for a swing-up.
         steps: Control steps of every other round.
-        lives: Least and greatest length of an episode, drawn for each [control steps].
+        top: Least and greatest time at the top, drawn for each episode [control steps].
         led: Rounds until the share of episodes that the regulator leads has fallen to a tenth.
         updates: Of the network in each round.
         batch_size: States in each update.
@@ -43,9 +43,9 @@ class ImitationSettings:
 
     worlds: int = 512
     rounds: int = 12
-    first: int = 350
+    first: int = 300
     steps: int = 100
-    lives: tuple[int, int] = (250, 400)
+    top: tuple[int, int] = (50, 200)
     led: int = 10
     updates: int = 600
     batch_size: int = 2048
@@ -212,7 +212,8 @@ class Imitation:
         count = int(worlds.sum())
         self._states[worlds] = self._model.draw(count, self._random)
         self._ages[worlds] = 0
-        self._lives[worlds] = self._random.integers(*self.settings.lives, count)
+        top = self._random.integers(*self.settings.top, count)
+        self._lives[worlds] = self._regulator.arrival + top
         self._led[worlds] = self._random.random(count) < led
         self._noise[worlds] = self._random.choice(_NOISE, count)
 

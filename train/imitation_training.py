@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+import yaml
 from tqdm import tqdm
 
 from checkpoint import save_model
 from config import TrainingConfig, check_at_least
 from curves import LearningCurve, Point, plot_learning_curve, write_csv
+from files import write_atomically
 from imitation import Imitation, ImitationSettings
 from interrupt import InterruptRequest
 from pbd_gym.hyperparams import algorithm_arguments, algorithm_class
@@ -32,6 +36,12 @@ class Settings(NamedTuple):
     search: SwingUpSettings
     imitation: ImitationSettings
 
+    def save(self, path: Path) -> None:
+        """Write them as YAML."""
+        content = {name: dataclasses.asdict(part) for name, part in self._asdict().items()}
+        with write_atomically(path) as file:
+            file.write(yaml.safe_dump(content, sort_keys=False).encode())
+
 
 def new_settings(options: dict[str, Any]) -> tuple[TrainingConfig, Settings]:
     """Complete what the user gave with the defaults.
@@ -40,6 +50,7 @@ def new_settings(options: dict[str, Any]) -> tuple[TrainingConfig, Settings]:
     """
     options = dict(options)
     planned = _take(options, candidates="candidates", iterations="iterations")
+    planned |= {"seconds": options.pop("seconds")} if "seconds" in options else {}
     imitated = _take(options, rounds="rounds", updates="updates", num_envs="worlds")
     search, imitation = SwingUpSettings(**planned), ImitationSettings(**imitated)
     units = imitation.hidden + 2

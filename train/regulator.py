@@ -107,12 +107,17 @@ class Regulator:
         states: Of a motion that ends near the top, (T + 1, n).
         pushes: (T,).
         hold: Control steps at the top that are added to the motion.
+
+    Attributes:
+        arrival: Phase at which the motion has come up, T.
+        states: Of the motion with what was added, and the top itself (T + hold + 2, n).
+        pushes: (T + hold + 2,).
     """
 
     def __init__(
         self, model: PendulumModel, states: np.ndarray, pushes: np.ndarray, hold: int = 100
     ) -> None:
-        self._model = model
+        self._model, self.arrival = model, len(pushes)
         top = regulate_top(model)
         states, pushes = self._held(states, pushes, top, hold)
         gains = regulate_motion(model, states, pushes, top.costs)

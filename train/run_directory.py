@@ -19,6 +19,11 @@ class RunDirectory:
         return self.path / "config.yml"
 
     @property
+    def imitation(self) -> Path:
+        """How train/imitate.py planned and imitated."""
+        return self.path / "imitation.yml"
+
+    @property
     def checkpoint(self) -> Path:
         """The state of the training, from which `--resume` continues exactly."""
         return self.path / "checkpoint.pkl"

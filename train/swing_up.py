@@ -25,7 +25,7 @@ class SwingUpSettings:
     """How swing-ups are searched.
 
     Attributes:
-        steps: Of a swing-up [control steps].
+        seconds: Length of a swing-up [s], 0.5 to 60.
         candidates: First guesses that are improved side by side.
         iterations: Improvements of each.
         amplitude: Standard deviation of the pushes' sines in a first guess [m/s].
@@ -37,7 +37,7 @@ class SwingUpSettings:
         rate_stiffness: Cost of exceeding the rate [s2/rad2].
     """
 
-    steps: int = 200
+    seconds: float = 2.5
     candidates: int = 16
     iterations: int = 120
     amplitude: float = 0.06
@@ -47,6 +47,10 @@ class SwingUpSettings:
     rate: float = 9.0
     stiffness: float = 500.0
     rate_stiffness: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not 0.5 <= self.seconds <= 60.0:
+            raise ValueError(f"seconds must be 0.5 to 60, got {self.seconds}")
 
 
 class Motions(NamedTuple):
@@ -93,7 +97,8 @@ class SwingUpSearch:
     def _guess(self, random: np.random.Generator) -> np.ndarray:
         """Return pushes (N, T): sums of four sines of 0.5 to 2 Hz."""
         settings = self._settings
-        time = np.arange(settings.steps) / self._model.task.control_rate
+        rate = self._model.task.control_rate
+        time = np.arange(round(settings.seconds * rate)) / rate
         shape = (4, settings.candidates, 1)
         turns = random.uniform(0.5, 2.0, shape) * time + random.random(shape)
         sines = random.normal(0.0, settings.amplitude, shape) * np.sin(2.0 * np.pi * turns)
