@@ -13,6 +13,7 @@ from files import write_atomically
 from scores import Score
 
 _COLORS = {"ppo": "#0072b2", "sac": "#d55e00", "crossq": "#56b4e9", "imitate": "#cc79a7"}
+_NAMES = {"ppo": "PPO", "sac": "SAC", "crossq": "CrossQ", "imitate": "imitation"}
 _LEVELS = {"scripted": ("#009e73", "--"), "planner": ("#7f5aa2", ":"), "random": ("#888888", "-.")}
 
 
@@ -69,5 +70,5 @@ def _draw_band(
     lines = [np.interp(grid, *pair) for pair in zip(times, values, strict=True)]
     color = _COLORS[algorithm]
     axis.fill_between(grid, np.min(lines, axis=0), np.max(lines, axis=0), color=color, alpha=0.2)
-    label = f"{algorithm.upper()}, {len(runs)} seeds"
+    label = f"{_NAMES[algorithm]}, {len(runs)} seeds"
     axis.plot(grid, np.median(lines, axis=0), color=color, linewidth=1.8, label=label)
