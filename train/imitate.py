@@ -29,7 +29,7 @@ DEFAULT_ENV = "pbd_gym:PBDTriplePendulum-v0"
 EXAMPLES = """\
 examples:
   python train/imitate.py
-        three links, in little more than a minute
+      three links, in little more than a minute
   python train/imitate.py --env pbd_gym:PBDDoublePendulum-v0 --seed 1
   python train/imitate.py --seconds 3 --no-video
       a slower swing-up
