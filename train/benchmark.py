@@ -166,6 +166,7 @@ def run_all(cells: Sequence[Cell], options: argparse.Namespace) -> None:
             done.result()
     finally:
         pool.shutdown(cancel_futures=True)
+    print(f"{len(missing)} runs in {(time.monotonic() - began) / 60:.0f} min", flush=True)
 
 
 def run_script(script: list[str], *, quiet: bool) -> None:

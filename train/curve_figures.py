@@ -20,7 +20,7 @@ _LEVELS = {"scripted": ("#009e73", "--"), "planner": ("#7f5aa2", ":"), "random":
 def draw_curves(
     path: Path, title: str, curves: Mapping[str, Sequence[Sequence[Point]]], scores: Sequence[Score]
 ) -> None:
-    """Draw success rate and return against steps and wall time as a PNG.
+    """Draw success rate and return against steps and wall time, both logarithmic, as a PNG.
 
     Args:
         path: Of the PNG.
@@ -30,6 +30,7 @@ def draw_curves(
         scores: Of the same environment; untrained policies are drawn as levels.
     """
     from matplotlib.figure import Figure
+    from matplotlib.ticker import EngFormatter
 
     figure = Figure(figsize=(10, 6), layout="constrained")
     axes = figure.subplots(2, 2, sharex="col", sharey="row")
@@ -46,13 +47,16 @@ def draw_curves(
                 if values:
                     level = float(np.mean(values))
                     axis.axhline(level, color=color, linestyle=style, linewidth=1.2, label=policy)
+            # one algorithm may need a hundred times as many steps as another
+            axis.set_xscale("log")
             axis.grid(alpha=0.3)
             axis.spines[["top", "right"]].set_visible(False)
         axes[row, 0].set_ylabel(label)
     axes[0, 0].set_ylim(-0.03, 1.03)
-    axes[1, 0].set_xlabel("environment steps [million]")
-    axes[1, 0].xaxis.set_major_formatter(lambda steps, _: f"{steps / 1e6:g}")
+    axes[1, 0].set_xlabel("environment steps")
+    axes[1, 0].xaxis.set_major_formatter(EngFormatter(sep=""))
     axes[1, 1].set_xlabel("wall time [s]")
+    axes[1, 1].xaxis.set_major_formatter("{x:g}")
     # a level may lie at either end of the success rate; below the figure nothing is in the way
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     with write_atomically(path) as file:
@@ -62,11 +66,14 @@ def draw_curves(
 def _draw_band(
     axis: Any, algorithm: str, runs: Sequence[Sequence[Point]], clock: str, quantity: str
 ) -> None:
-    """Draw one algorithm: its seeds are interpolated at common times, as far as all of them ran."""
+    """Draw one algorithm: its seeds are interpolated at common times, as far as all of them ran.
+
+    Until its first evaluation, which may come later than another seed's, a seed has its value.
+    """
     times = [[getattr(point, clock) for point in run] for run in runs]
     values = [[getattr(point, quantity) for point in run] for run in runs]
-    start, end = max(time[0] for time in times), min(time[-1] for time in times)
-    grid = np.linspace(start, end, 200)
+    start, end = min(time[0] for time in times), min(time[-1] for time in times)
+    grid = np.geomspace(start, end, 400)
     lines = [np.interp(grid, *pair) for pair in zip(times, values, strict=True)]
     color = _COLORS[algorithm]
     axis.fill_between(grid, np.min(lines, axis=0), np.max(lines, axis=0), color=color, alpha=0.2)
