@@ -1,5 +1,6 @@
 """The comparison of policies over seeds: its statistics, what it skips, and what it writes."""
 
+import json
 import math
 import sys
 from pathlib import Path
@@ -11,10 +12,13 @@ pytest.importorskip("stable_baselines3")
 sys.path.insert(0, str(Path(__file__).parents[1] / "train"))
 
 import benchmark
+import comparison
+from cells import ENVIRONMENTS, Cell
 from curves import LearningCurve, Point, read_csv, write_csv
 from scores import Score, interquartile_mean, overall_table, read_scores, table, write_scores
 
 NOTHING = (math.nan,) * 5
+EARNED = ("success_rate", "normalized_performance", "return")
 
 
 def score(env="PBDRope-v0", policy="ppo", seed=0, performance=0.5, training=NOTHING):
@@ -65,19 +69,34 @@ def test_performance_over_all_environments_is_told_by_policy():
 def test_the_table_goes_between_its_marks_and_nowhere_else(tmp_path):
     readme = tmp_path / "README.md"
     readme.write_text("before\n<!-- baselines -->\nold\n<!-- /baselines -->\nafter\n")
-    benchmark.put_into(readme, "new")
+    comparison.put_into(readme, "new")
     expected = "before\n<!-- baselines -->\nnew\n<!-- /baselines -->\nafter\n"
     assert readme.read_text() == expected
     readme.write_text("no marks\n")
     with pytest.raises(ValueError, match="has no <!-- baselines -->"):
-        benchmark.put_into(readme, "new")
+        comparison.put_into(readme, "new")
     assert readme.read_text() == "no marks\n"
+
+
+def test_all_environments_that_were_trained_are_drawn_in_one_figure(tmp_path):
+    (tmp_path / "results").mkdir()
+    cells = [Cell(env, "ppo", seed) for env in ENVIRONMENTS[:2] for seed in range(2)]
+    summary = {"episodes": 100} | {key: {"mean": 0.5} for key in EARNED}
+    for number, cell in enumerate(cells, start=1):
+        cell.run(tmp_path).path.mkdir()
+        evaluations = [Point(10, 0.5, 1.0, 0.0), Point(20, 1.5 * number, 2.0, 1.0)]
+        write_csv(cell.run(tmp_path).curve_table, LearningCurve([], evaluations))
+        cell.run(tmp_path).evaluation.write_text(json.dumps(summary))
+        comparison.report(cells, tmp_path, tmp_path / "results", None)
+        drawn = {file.stem for file in (tmp_path / "results").glob("*.png")}
+        # one environment has its own figure, which shows as much
+        assert drawn == set(ENVIRONMENTS[:1] if number < 3 else [*ENVIRONMENTS[:2], "success"])
 
 
 def test_the_table_in_the_readme_is_of_the_scores_beside_it():
     root = Path(__file__).parents[1]
     readme = (root / "README.md").read_text(encoding="utf-8")
-    shown = readme.split(benchmark.MARKS[0])[1].split(benchmark.MARKS[1])[0].strip()
+    shown = readme.split(comparison.MARKS[0])[1].split(comparison.MARKS[1])[0].strip()
     assert shown == table(read_scores(root / "docs/results/baselines.csv"))
 
 
