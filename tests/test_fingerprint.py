@@ -54,7 +54,7 @@ def test_another_process_for_another_processor_computes_the_same(tmp_path, proce
         env={
             **os.environ,
             "PYTHONPATH": str(Path(pbd_gym.__file__).parents[1]),
-            "XDG_CACHE_HOME": str(tmp_path),
+            "NUMBA_CACHE_DIR": str(tmp_path),
             "NUMBA_CPU_NAME": processor,
             "NUMBA_CPU_FEATURES": "",
         },
