@@ -21,7 +21,7 @@ _LEVELS = {"scripted": ("#009e73", "--"), "planner": ("#7f5aa2", ":"), "random":
 
 
 def draw_curves(path: Path, title: str, curves: Curves, scores: Sequence[Score]) -> None:
-    """Draw success rate and return against steps and wall time, both logarithmic, as a PNG.
+    """Draw success rate and return against steps and wall time as a PNG.
 
     Args:
         path: Of the PNG.
@@ -48,8 +48,9 @@ def draw_curves(path: Path, title: str, curves: Curves, scores: Sequence[Score])
                 if values:
                     level = float(np.mean(values))
                     axis.axhline(level, color=color, linestyle=style, linewidth=1.2, label=policy)
-            _scale_clock(axis)
         axes[row, 0].set_ylabel(label)
+    for column in axes.T:
+        _scale_clock(column)
     axes[0, 0].set_ylim(-0.03, 1.03)
     axes[1, 0].set_xlabel("environment steps")
     axes[1, 0].xaxis.set_major_formatter(EngFormatter(sep=""))
@@ -61,7 +62,7 @@ def draw_curves(path: Path, title: str, curves: Curves, scores: Sequence[Score])
 
 
 def draw_overview(path: Path, curves: Mapping[str, Curves]) -> None:
-    """Draw success rates against logarithmic wall time, one panel per environment, as a PNG.
+    """Draw success rates against wall time, one panel per environment, as a PNG.
 
     Args:
         path: Of the PNG.
@@ -78,9 +79,9 @@ def draw_overview(path: Path, curves: Mapping[str, Curves]) -> None:
     for axis, (env, algorithms) in zip(axes, curves.items(), strict=False):
         for algorithm, runs in algorithms.items():
             lines[algorithm] = _draw_band(axis, algorithm, runs, "seconds", "success_rate")
-        _scale_clock(axis)
         axis.set_title(env, fontsize=10)
         axis.tick_params(labelbottom=True)
+    _scale_clock(axes[: len(curves)])
     axes[0].set_ylim(-0.03, 1.03)
     figure.supxlabel("wall time [s]", fontsize=10)
     figure.supylabel("success rate", fontsize=10)
@@ -92,12 +93,16 @@ def draw_overview(path: Path, curves: Mapping[str, Curves]) -> None:
         figure.savefig(file, format="png", dpi=110)
 
 
-def _scale_clock(axis: Any) -> None:
-    # one algorithm may need a hundred times as long as another
-    axis.set_xscale("log")
-    axis.xaxis.set_major_formatter("{x:g}")
-    axis.grid(alpha=0.3)
-    axis.spines[["top", "right"]].set_visible(False)
+def _scale_clock(axes: np.ndarray) -> None:
+    """Give panels of one clock, which is logarithmic over more than a decade, their scale."""
+    start = min(axis.dataLim.minposx for axis in axes)
+    end = max(axis.dataLim.x1 for axis in axes)
+    for axis in axes:
+        # one algorithm may need a hundred times as long as another
+        axis.set_xscale("log" if end > 10 * start else "linear")
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.grid(alpha=0.3)
+        axis.spines[["top", "right"]].set_visible(False)
 
 
 def _draw_band(
@@ -115,5 +120,5 @@ def _draw_band(
     lines = [np.interp(grid, *pair) for pair in zip(times, values, strict=True)]
     color = _COLORS[algorithm]
     axis.fill_between(grid, np.min(lines, axis=0), np.max(lines, axis=0), color=color, alpha=0.2)
-    label = f"{_NAMES[algorithm]}, {len(runs)} seeds"
+    label = f"{_NAMES[algorithm]}, {len(runs)} seed{'s' if len(runs) > 1 else ''}"
     return axis.plot(grid, np.median(lines, axis=0), color=color, linewidth=1.8, label=label)[0]
